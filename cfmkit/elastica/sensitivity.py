@@ -147,8 +147,8 @@ class Gradient:
 
         def output(net: Network, at: Equilibria) -> Any:
             element = beam_states.elements_of(at.mesh, beam)[-1 if end else 0]
-            found = beam_states.states_of_elements(net, at, [element], np.array([float(end)]))
-            return np.stack([found.h[:, 0], found.v[:, 0], found.moment[:, 0]], axis=-1)
+            state = beam_states.states_of_elements(net, at, [element], np.array([float(end)]))
+            return np.stack([state.h[:, 0], state.v[:, 0], state.moment[:, 0]], axis=-1)
 
         return self.differentiate(output)
 
@@ -194,10 +194,10 @@ class Gradient:
         """Return the beams' widths [m] at the places of `dual_states`, (n,), and these states, all with derivatives."""
         states = self.dual_states(elements, fractions)
         names = [self.path.mesh.elements.beam[element] for element in elements]
-        each = np.array([[net.beams[name].section.width for name in names] for net, _ in self.designs.networks])
-        own = np.array([self.path.network.beams[name].section.width for name in names])
+        stepped = np.array([[net.beams[name].section.width for name in names] for net, _ in self.designs.networks])
+        widths = np.array([self.path.network.beams[name].section.width for name in names])
         count = len(states.place) // len(names)
-        return dual_of_steps(np.repeat(own, count), np.repeat(each, count, axis=1)), states
+        return dual_of_steps(np.repeat(widths, count), np.repeat(stepped, count, axis=1)), states
 
     @cached_property
     def _states_by_places(self) -> dict[Any, beam_states.BeamStates]:
@@ -221,8 +221,8 @@ class Gradient:
         An extreme inside a beam stays one while its place moves, so that its place needs no derivative (envelope
         theorem).
         """
-        known = self.path.stress_extremes(beam, axial)
-        element, fraction = known.element[self.points], known.fraction[self.points]
+        peaks = self.path.stress_extremes(beam, axial)
+        element, fraction = peaks.element[self.points], peaks.fraction[self.points]
         return self.differentiate(lambda net, at: stress_extremes.stress_at(net, at, beam, element, fraction, axial))
 
 
@@ -259,9 +259,9 @@ def gradient(path: EquilibriumPath, build: Callable[[Any], Any], variables: Any,
         moved[k] += 1j * COMPLEX_STEP
         built = build(moved)
         pairs.append(built if isinstance(built, tuple) else (built, path.load_case))
-    own = make_up(path.network)
+    common = make_up(path.network)
     for k, (network, _) in enumerate(pairs):
-        if make_up(network) != own:
+        if make_up(network) != common:
             raise InputError(
                 f"design variable {k} changes the make-up of the network: no derivative with respect to it exists"
             )

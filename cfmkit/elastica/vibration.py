@@ -110,9 +110,9 @@ def frequencies(
     Raises InputError if a beam has no density, a mass is at no node, the count is not positive, the unknowns are too
     many, or there are contacts.
     """
-    _check(path, masses, count)
+    _check_arguments(path, masses, count)
     chosen = np.arange(len(path)) if points is None else np.asarray(points, dtype=np.int64)
-    fine = raise_degree(path.mesh, _degree(path.mesh, count))
+    fine = raise_degree(path.mesh, _degree_of_rotations(path.mesh, count))
     system = _VibratingNetwork(path, fine, masses)
     by_load = isinstance(path.load_case, Loading)
     held, free = (np.full((len(chosen), count), np.nan) for _ in range(2))
@@ -123,7 +123,7 @@ def frequencies(
         matrices = system.assemble_matrices(z, float(path.at.drive[point]))
         row = system.row_of(z, *hold) if hold is not None and by_load else None
         (squares, *still), (others, *loose) = (
-            _squares(*_choose_unknowns(fine, matrices, is_held, row), count) for is_held in (True, False)
+            _lowest_squares(*_choose_unknowns(fine, matrices, is_held, row), count) for is_held in (True, False)
         )
         held[k], free[k] = unit * np.sqrt(squares), unit * np.sqrt(others)
         grows[:, k] = loose if by_load else still
@@ -131,7 +131,7 @@ def frequencies(
     return Frequencies(read_only(chosen, np.int64), read_only(held), read_only(free), flutters, diverges)
 
 
-def _check(path: EquilibriumPath, masses: NetworkMasses, count: int) -> None:
+def _check_arguments(path: EquilibriumPath, masses: NetworkMasses, count: int) -> None:
     if count < 1:
         raise InputError(f"at least one frequency must be requested, got {count}")
     if path.network.contacts:
@@ -141,8 +141,8 @@ def _check(path: EquilibriumPath, masses: NetworkMasses, count: int) -> None:
     for name in masses.nodes:
         if name not in path.network.nodes:
             raise InputError(f"a mass is given for {name!r}, which is not a node")
-    elements, degree = len(path.mesh.elements.length), _degree(path.mesh, count)
-    size = path.mesh.size + elements * (degree - path.mesh.degree + 4 * _order(path.mesh, degree))
+    elements, degree = len(path.mesh.elements.length), _degree_of_rotations(path.mesh, count)
+    size = path.mesh.size + elements * (degree - path.mesh.degree + 4 * _order_of_inner_forces(path.mesh, degree))
     if size > MAX_UNKNOWNS:
         raise InputError(
             f"natural frequencies need {size} unknowns, more than {MAX_UNKNOWNS}: the beams have too many windings "
@@ -150,13 +150,13 @@ def _check(path: EquilibriumPath, masses: NetworkMasses, count: int) -> None:
         )
 
 
-def _degree(mesh: Discretisation, count: int) -> int:
+def _degree_of_rotations(mesh: Discretisation, count: int) -> int:
     """Return the degree of the rotations: modes of a beam are spread over its elements."""
     wanted = DEGREE_OF_FIRST + int(DEGREE_PER_MODE * count / _elements_a_beam(mesh))
     return max(mesh.degree, min(MAX_DEGREE, max(wanted, mesh.degree + DEGREES_BESIDE_STATICS)))
 
 
-def _order(mesh: Discretisation, degree: int) -> int:
+def _order_of_inner_forces(mesh: Discretisation, degree: int) -> int:
     """Return the order of forces and, by one more, positions: as smooth as sines of the rotation."""
     return degree - 1 if _elements_a_beam(mesh) < LONG_CHAIN else min(degree - 1, ORDER_IN_CHAIN)
 
@@ -178,35 +178,35 @@ class _VibratingNetwork:
 
     def __init__(self, path: EquilibriumPath, fine: Discretisation, masses: NetworkMasses) -> None:
         self.network, self.fine, self.masses = path.network, fine, masses
-        self.order = _order(fine, fine.degree)
+        self.order = _order_of_inner_forces(fine, fine.degree)
         rule = basis(fine.degree)
         self.rule = rule
         self.bubbles = shape_functions(self.order + 1, rule.places)[0][:, 2:]
         self.forces = legendre.legvander(2 * rule.places - 1, self.order)[:, 1:]
-        elements, own = len(fine.elements.length), 4 * self.order
-        self.size = fine.size + elements * own
-        inner = fine.size + np.arange(elements * own).reshape(elements, 2, 2, self.order)
+        elements, inner_count = len(fine.elements.length), 4 * self.order
+        self.size = fine.size + elements * inner_count
+        inner = fine.size + np.arange(elements * inner_count).reshape(elements, 2, 2, self.order)
         self.positions, self.varying = inner[:, 0], inner[:, 1]  # (e, axis, order) unknowns: bubbles; forces
 
     def assemble_matrices(self, z: FloatArray, drive: float) -> _Matrices:
         """Return the matrices about a pose."""
         stiffness = np.zeros((self.size, self.size))
         stiffness[: self.fine.size, : self.fine.size] = energy.hessian(self.fine, z, drive)
-        self._vary(stiffness, z, drive)
-        columns = [self._spread(*given) for given in self._iterate_masses(z)]
+        self._add_inner_forces(stiffness, z, drive)
+        columns = [self._root_columns(*mass) for mass in self._iterate_masses(z)]
         for name, (weight, inertia) in self.masses.nodes.items():
-            moves, unknowns = self._node(z, name)
+            moves, unknowns = self._node_motion(z, name)
             size = np.array([weight, weight, inertia / self.fine.scales.length**2])
-            columns.append(self._spread(unknowns, moves, size))
+            columns.append(self._root_columns(unknowns, moves, size))
         return _Matrices(stiffness, np.hstack(columns))
 
-    def _spread(self, unknowns: Any, moves: FloatArray, masses: FloatArray) -> FloatArray:
+    def _root_columns(self, unknowns: Any, moves: FloatArray, masses: FloatArray) -> FloatArray:
         """Return columns of the root, (size, m), of points that some unknowns move by moves (m, unknowns)."""
         column = np.zeros((self.size, len(moves)))
         np.add.at(column, unknowns, moves.T * np.sqrt(masses))
         return column
 
-    def _vary(self, stiffness: FloatArray, z: FloatArray, drive: float) -> None:
+    def _add_inner_forces(self, stiffness: FloatArray, z: FloatArray, drive: float) -> None:
         """Add what forces that vary along elements do, and what positions inside do to them."""
         e, at = self.fine.elements, energy.fields(self.fine, z, drive)
         softer, order = e.axial - e.shear, self.order
@@ -226,10 +226,10 @@ class _VibratingNetwork:
                 np.add.at(stiffness, (rotations[k][:, None], rows), turning.T)
                 inside = self.positions[k, axis]
                 stiffness[rows, inside] = stiffness[inside, rows] = couple
-                for other in (0, 1):
-                    mean, share = e.unknowns[k, other - 2], weight * soft[axis][other][k]
+                for column_axis in (0, 1):
+                    mean, share = e.unknowns[k, column_axis - 2], weight * soft[axis][column_axis][k]
                     stiffness[rows, mean] = stiffness[mean, rows] = -(self.forces.T @ share)
-                    stiffness[np.ix_(rows, self.varying[k, other])] = -(self.forces.T * share) @ self.forces
+                    stiffness[np.ix_(rows, self.varying[k, column_axis])] = -(self.forces.T * share) @ self.forces
 
     def _iterate_masses(self, z: FloatArray) -> Iterator[tuple[Any, FloatArray, FloatArray]]:
         """Yield unknowns, what they move the points of beams by, and masses; and the same of sections' rotations."""
@@ -249,20 +249,20 @@ class _VibratingNetwork:
             if section.shear:  # slenderness at which inertia of sections counts is that at which shear does
                 yield rotations[k], self.rule.values, density * (thickness / fine.scales.length) ** 2 / 12
 
-    def _node(self, z: FloatArray, name: str) -> tuple[FloatArray, Any]:
+    def _node_motion(self, z: FloatArray, name: str) -> tuple[FloatArray, Any]:
         """Return the motion of a node (3, 4) by its unknowns, and their numbers."""
-        here = poses(self.fine.attachments, z, [self.fine.nodes[name]])
+        pose = poses(self.fine.attachments, z, [self.fine.nodes[name]])
         moves = np.zeros((3, 4))
-        moves[:2, :3], moves[2, 3] = here.jacobian[0], 1.0
-        return moves, here.unknowns[0]
+        moves[:2, :3], moves[2, 3] = pose.jacobian[0], 1.0
+        return moves, pose.unknowns[0]
 
     def row_of(self, z: FloatArray, name: str, direction: float | None) -> FloatArray:
-        """Return what the unknowns count for in a node's motion along a direction, or in its rotation, (size,)."""
-        moves, unknowns = self._node(z, name)
+        """Return the row (size,) that gives a node's motion along a direction, or its rotation, from all unknowns."""
+        moves, unknowns = self._node_motion(z, name)
         row = moves[2] if direction is None else np.cos(direction) * moves[0] + np.sin(direction) * moves[1]
-        found = np.zeros(self.size)
-        np.add.at(found, unknowns, row)
-        return found
+        combination = np.zeros(self.size)
+        np.add.at(combination, unknowns, row)
+        return combination
 
 
 def _choose_unknowns(
@@ -270,45 +270,45 @@ def _choose_unknowns(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the matrices of the unknowns that move while the drive is held, or free; a row that is held as a force."""
     driven = np.empty(0, int) if is_held else np.flatnonzero(fine.rate)
-    own = np.concatenate([fine.free, driven, np.arange(fine.size, len(matrices.root))])
-    stiffness, root = matrices.stiffness[np.ix_(own, own)], matrices.root[own]
+    moving = np.concatenate([fine.free, driven, np.arange(fine.size, len(matrices.root))])
+    stiffness, root = matrices.stiffness[np.ix_(moving, moving)], matrices.root[moving]
     if row is None or not is_held:
         return stiffness, root
-    tied = np.append(row[own], 0.0)
+    tied = np.append(row[moving], 0.0)
     stiffness, root = np.pad(stiffness, (0, 1)), np.pad(root, ((0, 1), (0, 0)))
     stiffness[-1], stiffness[:, -1] = tied, tied
     return stiffness, root
 
 
-def _squares(stiffness: FloatArray, root: FloatArray, count: int) -> tuple[FloatArray, bool, bool]:
+def _lowest_squares(stiffness: FloatArray, root: FloatArray, count: int) -> tuple[FloatArray, bool, bool]:
     """Return the lowest squares of frequencies, nan where it is unstable; whether it flutters, and diverges."""
-    found = np.full(count, np.nan)
+    lowest_squares = np.full(count, np.nan)
     shift = len(root) / max(float((root**2).sum()), np.finfo(float).tiny)  # EI / (mass length^3) or so
     symmetric = np.abs(stiffness - stiffness.T).max() <= np.finfo(float).eps * np.abs(stiffness).max()
     try:
         flexible = root.T @ np.linalg.solve(stiffness + shift * root @ root.T, root)
     except np.linalg.LinAlgError:
-        return found, False, not symmetric
+        return lowest_squares, False, not symmetric
     if symmetric:
         inverse = np.linalg.eigvalsh(0.5 * (flexible + flexible.T))
         largest = float(np.abs(inverse).max(initial=0.0))
         lowest = inverse[inverse > np.finfo(float).eps * largest][::-1][:count]
         squares = 1 / lowest - shift
         if inverse[0] < -FLEXIBILITY_RTOL * largest or (squares < -INSTABILITY_RTOL * shift).any():
-            return found, False, False
-        found[: len(squares)] = np.where(squares < ZERO_FREQUENCY_RTOL * shift, 0.0, squares)
-        return found, False, False
-    return _with_turning(np.linalg.eigvals(flexible), shift, count)
+            return lowest_squares, False, False
+        lowest_squares[: len(squares)] = np.where(squares < ZERO_FREQUENCY_RTOL * shift, 0.0, squares)
+        return lowest_squares, False, False
+    return _lowest_squares_when_turning(np.linalg.eigvals(flexible), shift, count)
 
 
-def _with_turning(inverse: Any, shift: float, count: int) -> tuple[FloatArray, bool, bool]:
-    """Return the same under loads that turn with their node."""
-    found = np.full(count, np.nan)
+def _lowest_squares_when_turning(inverse: Any, shift: float, count: int) -> tuple[FloatArray, bool, bool]:
+    """Return squares of frequencies, flutter and divergence under loads that turn with their node."""
+    lowest_squares = np.full(count, np.nan)
     lowest = inverse[np.argsort(-np.abs(inverse))][: N_RESOLVED * (count + 1)]
     squares = 1.0 / lowest[np.abs(lowest) > np.finfo(float).eps * np.abs(lowest[0])] - shift
     complex_ones = np.abs(squares.imag) > COMPLEX_SHARE * np.abs(squares)
     swings, falls = bool(complex_ones.any()), bool((squares.real[~complex_ones] <= 0.0).any())
     if not (swings or falls):
         real = np.sort(squares.real)[:count]
-        found[: len(real)] = real
-    return found, swings, falls
+        lowest_squares[: len(real)] = real
+    return lowest_squares, swings, falls

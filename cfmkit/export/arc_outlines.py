@@ -212,6 +212,6 @@ def _check_holes(cuts: Sequence[tuple[str, Outline, Any]]) -> None:
     for name, outline, hole in holes:
         if not any(solid.contains(hole) for solid in solids):
             raise GeometryError(f"{name} is a hole at {place(outline.chain.nodes[0])}, outside every cut contour")
-    for (one, _, a), (other, outline, b) in itertools.combinations(holes, 2):
+    for (first, _, a), (second, outline, b) in itertools.combinations(holes, 2):
         if a.intersects(b):
-            raise GeometryError(f"the holes {one} and {other} touch or overlap, at {place(outline.chain.nodes[0])}")
+            raise GeometryError(f"the holes {first} and {second} touch or overlap, at {place(outline.chain.nodes[0])}")

@@ -180,7 +180,7 @@ def _trace_rings(whole: Any, tracks: Sequence[TracedEdge], size: float) -> Itera
     )
     for part in getattr(orient_polygons(whole), "geoms", [orient_polygons(whole)]):
         for ring in (part.exterior, *part.interiors) if part.geom_type == "Polygon" else ():
-            corners = _drop_close_corners(np.asarray(ring.coords)[:-1] @ np.array([1, 1j]), sources.near)
+            corners = _drop_close_corners(np.asarray(ring.coords)[:-1] @ np.array([1, 1j]), sources.reach)
             away = corners - corners[0]
             if 0.5 * abs((np.conj(away) * np.roll(away, -1)).imag.sum()) > (MIN_HOLE_SIDE * size) ** 2:
                 yield sources.runs(corners)
@@ -207,19 +207,19 @@ class _Sources:
     owner: NDArray[np.int64]
     number: NDArray[np.int64]
     tree: Any
-    near: float
+    reach: float
 
     def runs(self, corners: NDArray[np.complex128]) -> list[_Run]:
         """Return the runs along a ring (n,) of corners, in their order."""
         from shapely import points
 
         a, b = corners, np.roll(corners, -1)
-        line, source = self.tree.query(points(xy(0.5 * (a + b))), predicate="dwithin", distance=self.near)
+        line, source = self.tree.query(points(xy(0.5 * (a + b))), predicate="dwithin", distance=self.reach)
         first, last = ((end[line] - self.starts[source]) / self.along[source] for end in (a, b))
         length = np.abs(self.along[source])
         off = np.maximum(np.abs(first.imag), np.abs(last.imag)) * length
-        slack = self.near / length
-        on = (off <= self.near) & (first.real < last.real) & (first.real >= -slack) & (last.real <= 1 + slack)
+        slack = self.reach / length
+        on = (off <= self.reach) & (first.real < last.real) & (first.real >= -slack) & (last.real <= 1 + slack)
         candidates: dict[int, list[tuple[int, float, float]]] = {}
         for k in np.flatnonzero(on).tolist():
             place = float(self.number[source[k]])

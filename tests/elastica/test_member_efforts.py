@@ -14,6 +14,6 @@ def test_the_efforts_of_all_members_are_that_of_the_drive(name):
     solution = cfmkit.analyze(f"configs/{name}.yaml").state
     here = solution.path.take(solution.keep[1::10])
     free, drive = member_efforts._ways(here)
-    works = member_efforts._works(here, free, drive).sum(axis=0)
+    works = member_efforts._member_works(here, free, drive).sum(axis=0)
     total = solution.assembly.parallel * works / (drive * here.mesh.scales.drive)
     np.testing.assert_allclose(total, solution.effort[1::10], rtol=1e-7)

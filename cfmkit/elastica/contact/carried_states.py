@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 def carry(
     old: Discretisation, z: FloatArray, stage: LoadStage, new: Discretisation, places: FloatArray | None = None
 ) -> FloatArray:
-    """Return states (n, size) of a network on other elements of the same degree: fields are evaluated anew.
+    """Return states (n, size) of a network on other elements of the same degree, their fields evaluated there.
 
     Forces of contacts are those of the same contacts of nodes; of sides they are zero. `places` (n, k) are those of the
     contacts of sides of the new elements, if they are not those that these were made for.
@@ -50,12 +50,12 @@ def carry(
             values[:, rows[:, 8:]] = z[:, old.elements.unknowns[before, 8:]]
             last = old.elements.ends[before[:-1], 1]
             values[:, bodies] = z[:, old.attachments.unknowns[last]]
-            values[:, bodies[:, :2]] += _origins(old, last) - _origins(new, joints)
+            values[:, bodies[:, :2]] += _places_at_rest(old, last) - _places_at_rest(new, joints)
             continue
         left, right = fresh[:, after, :1], fresh[:, after, 1:]
         at = left + (right - left) * np.append(rule.places, (0.0, 1.0))
-        place, turn, force = _sample(old, z, stage, before, cuts[:, before], at)
-        values[:, bodies[:, :2]] = place[:, :-1] - _origins(new, joints)
+        place, turn, force = _sample_parts(old, z, stage, before, cuts[:, before], at)
+        values[:, bodies[:, :2]] = place[:, :-1] - _places_at_rest(new, joints)
         values[:, bodies[:, 2]] = turn[:, :-1, -1]
         rest = turn[..., :-2] - turn[..., -2:-1] * rule.values[:, 0] - turn[..., -1:] * rule.values[:, 1]
         values[:, rows[:, columns[2:]]] = rest @ bubbles.T
@@ -75,14 +75,14 @@ def _bubble_matrix(degree: int) -> FloatArray:
     return read_only(np.linalg.pinv(basis(degree).values[:, 2:]))
 
 
-def _origins(mesh: Discretisation, places: Any) -> FloatArray:
+def _places_at_rest(mesh: Discretisation, places: Any) -> FloatArray:
     return np.asarray(mesh.attachments.origin[places] + mesh.attachments.arm[places])
 
 
-def _sample(
+def _sample_parts(
     mesh: Discretisation, z: FloatArray, stage: LoadStage, elements: Any, cuts: FloatArray, at: FloatArray
 ) -> tuple[Any, Any, Any]:
-    """Return where m parts of a beam end in n states, (n, m, 2), rotations at parameters (n, m, k), and end forces."""
+    """Return places (n, m, 2) at ends of m parts of a beam, rotations (n, m, k) on them, end forces, in n states."""
     count, states = len(z), np.arange(len(z))[:, None]
     flat = at.reshape(count, -1)
     home = np.minimum((flat[..., None] > cuts[:, None, :, 1]).sum(axis=-1), len(elements) - 1)

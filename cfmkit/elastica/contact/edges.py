@@ -41,7 +41,7 @@ class EdgeMotion(NamedTuple):
 
 
 def find_motion(mesh: Discretisation, item: BeamSide, z: FloatArray) -> EdgeMotion:
-    """Return what moves an edge in a state (size,)."""
+    """Return the unknowns that move an edge, and their effect, in a state (size,)."""
     if isinstance(item, BeamOnObstacle):
         return EdgeMotion(np.zeros(0, np.int64), np.zeros((2, 0)), np.zeros(2))
     at = poses(mesh.attachments, z, [find_circle(mesh, item)[0]])

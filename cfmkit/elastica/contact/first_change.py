@@ -76,11 +76,11 @@ def _is_beside_change(piece: PieceOfPath, row: int, rows: list[int]) -> bool:
     """Return True if a row is a side that touches where another of its contacts changes, too."""
     conditions = piece.conditions.all
     others = (conditions[k] for k in rows if k != row and conditions[k].kind not in ("gap", "force", "grip", "slip"))
-    return conditions[row].kind == "touch" and any(_touch_alike(each.item, conditions[row].item) for each in others)
+    return conditions[row].kind == "touch" and any(_touch_alike(c.item, conditions[row].item) for c in others)
 
 
 def _touch_alike(item: BeamSide, neighbour: BeamSide) -> bool:
-    """Return True if two contacts are one, or of the same parts of the mechanism."""
+    """Return True if two contacts are the same, or of the same two parts of the mechanism."""
     return item is neighbour or (not isinstance(item, BeamOnObstacle) and item.name == neighbour.name)
 
 

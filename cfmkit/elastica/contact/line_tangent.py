@@ -64,9 +64,9 @@ def round_off(gap: Any, slope: Any, behind: Any, ahead: Any, kinks: FloatArray, 
 def find_reach(mesh: Discretisation, item: BeamSide, elements: Any) -> FloatArray:
     """Return how far from kinks at ends of elements these are taken off, (m, 1): all of it up to an end with a pad."""
     network = mesh.fits.network
-    beam, own = network.beams[item.beam], list_elements(mesh, item.beam)
+    beam, elements_of_beam = network.beams[item.beam], list_elements(mesh, item.beam)
     pads = [getattr(contact, "node", "") for contact in network.contacts if contact.name == item.name]
-    loose = [k for k, node in ((own[0], beam.start), (own[-1], beam.end)) if node in pads]
+    loose = [k for k, node in ((elements_of_beam[0], beam.start), (elements_of_beam[-1], beam.end)) if node in pads]
     reach = KINK_REACH * beam.section.thinnest / mesh.scales.length
     return np.where(np.isin(elements, loose), np.inf, reach)[:, None]
 

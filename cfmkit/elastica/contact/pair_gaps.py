@@ -43,11 +43,11 @@ class PairGaps(SideGaps):
         beam, kinks = mesh.fits.network.beams[item.beam], np.zeros((len(z), len(numbers), 2))
         shear = sum(measure_compliances(mesh, name, 0.5)[1] for name in (item.beam, item.partner))
         for contact in mesh.side_contacts:
-            own: Any = contact.item
-            if own.name != item.name:
+            touching: Any = contact.item
+            if touching.name != item.name:
                 continue
-            ends = [(contact.element, 1), (contact.element + 1, 0)] if own.beam == item.beam else []
-            node = own.node if isinstance(own, NodeOnBeam) else None
+            ends = [(contact.element, 1), (contact.element + 1, 0)] if touching.beam == item.beam else []
+            node = touching.node if isinstance(touching, NodeOnBeam) else None
             ends += [(self.elements[0], 0)] * (node == beam.start) + [(self.elements[-1], 1)] * (node == beam.end)
             for element, end in ends:
                 kinks[:, numbers == element, end] = 0.5 * shear * z[:, [contact.unknown]]
@@ -71,8 +71,8 @@ class PairGaps(SideGaps):
         nearest = np.array([((at[:, None] - line) ** 2).sum(axis=-1).argmin(axis=-1) for at, line in pairs])
         row, fraction = nearest // len(self.fractions), self.fractions[nearest % len(self.fractions)]
         place = np.take_along_axis(sampled, nearest[..., None], axis=1)
-        near = np.nonzero(np.hypot(*np.moveaxis(places - place, -1, 0)) < NEAR_DISTANCE)
-        row[near], fraction[near], place[near] = self._approach(places[near], near[0], row[near], fraction[near], lines)
+        ids = np.nonzero(np.hypot(*np.moveaxis(places - place, -1, 0)) < NEAR_DISTANCE)
+        row[ids], fraction[ids], place[ids] = self._approach(places[ids], ids[0], row[ids], fraction[ids], lines)
         last = len(self.partner_elements) - 1
         is_end = ((row == 0) & (fraction == 0)) | ((row == last) & (fraction == 1))
         cuts = lines.cuts[np.arange(len(z))[:, None], row]
@@ -84,8 +84,8 @@ class PairGaps(SideGaps):
         """Return rows of elements, fractions and places of the feet of k places (k, 2), from nearby ones (k,)."""
         last = len(self.partner_elements) - 1
         for _ in range(N_FOOT_STEPS):
-            here = lines.start[states, row], lines.slope[states, row]
-            place, tangent = interpolate_line(self.mesh.degree, fraction, *here)
+            segment = lines.start[states, row], lines.slope[states, row]
+            place, tangent = interpolate_line(self.mesh.degree, fraction, *segment)
             step = ((places - place) * tangent).sum(axis=-1) / (tangent * tangent).sum(axis=-1)
             before, behind = (fraction + step < 0) & (row > 0), (fraction + step > 1) & (row < last)
             row = row - before + behind
@@ -94,8 +94,8 @@ class PairGaps(SideGaps):
             fraction = advanced
             if stands:
                 break
-        here = lines.start[states, row], lines.slope[states, row]
-        place, _ = interpolate_line(self.mesh.degree, fraction, *here)
+        segment = lines.start[states, row], lines.slope[states, row]
+        place, _ = interpolate_line(self.mesh.degree, fraction, *segment)
         return row, fraction, place
 
     def find_partner_place(self, z: FloatArray, stage: LoadStage, parameter: float) -> float | None:

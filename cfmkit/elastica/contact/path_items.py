@@ -86,7 +86,7 @@ def join_pieces(
     """Return one network of elements for all pieces, and the states on it, (n, size)."""
     slots: list[_Slot] = []
     for piece in pieces:
-        slots = _common(slots, _slots_of(piece.mesh))
+        slots = _shortest_common_sequence(slots, _slots_of(piece.mesh))
     if not slots:
         return pieces[0].mesh, np.concatenate([piece.z for piece in pieces])
     ends = np.cumsum([0, *(len(piece.drive) for piece in pieces)]).tolist()
@@ -128,7 +128,7 @@ def _slots_of(mesh: Discretisation) -> list[_Slot]:
     return slots
 
 
-def _common(first: list[_Slot], second: list[_Slot]) -> list[_Slot]:
+def _shortest_common_sequence(first: list[_Slot], second: list[_Slot]) -> list[_Slot]:
     """Return the shortest sequence that has both sequences in it."""
     best: dict[tuple[int, int], list[_Slot]] = {}
     for i in range(len(first), -1, -1):
@@ -153,17 +153,17 @@ def _match_slots(sequence: list[_Slot], slots: list[_Slot]) -> list[int]:
     return joined
 
 
-def _fill_places(mesh: Discretisation, known: FloatArray, slots: list[_Slot]) -> FloatArray:
+def _fill_places(mesh: Discretisation, closed_places: FloatArray, slots: list[_Slot]) -> FloatArray:
     """Return the place of every slot in every state, from known ones (n, slots): nan where it is open."""
-    joined, total = known.copy(), len(known)
+    joined, total = closed_places.copy(), len(closed_places)
     for slot in range(len(slots)):
-        at = np.flatnonzero(np.isfinite(known[:, slot]))
-        joined[:, slot] = np.interp(np.arange(total), at, known[at, slot])
+        at = np.flatnonzero(np.isfinite(closed_places[:, slot]))
+        joined[:, slot] = np.interp(np.arange(total), at, closed_places[at, slot])
     for number, (name, beam) in enumerate(mesh.fits.network.beams.items()):
         mine = [k for k, slot in enumerate(slots) if slot.beam == number]
         parts, marks = [slots[k].part for k in mine], smooth_marks(beam, mesh.fits[name]) if mine else []
         for row in range(total if mine else 0):
-            joined[row, mine] = _place_between(known[row, mine], joined[row, mine], parts, marks)
+            joined[row, mine] = _place_between(closed_places[row, mine], joined[row, mine], parts, marks)
     return joined
 
 

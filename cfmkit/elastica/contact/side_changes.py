@@ -74,8 +74,8 @@ def locate_side_change(piece: PieceOfPath, step: StepBetween, row: int) -> Conta
     beyond = _enter_neighbour(piece, condition, at)
     if beyond is None:
         item = piece.whole.mesh.contacts[condition.number].item
-        return _stop_lost(at, REACHES_MARK, item, mark=_mark(piece, condition))
-    wanted = _opposite(beyond, condition)
+        return _stop_lost(at, REACHES_MARK, item, mark=_describe_mark(piece, condition))
+    wanted = _condition_beyond(beyond, condition)
     if wanted[0] == "wraps":
         begin = piece.carry(at, beyond)
     else:
@@ -97,7 +97,7 @@ def _enter_neighbour(piece: PieceOfPath, condition: Condition, at: PathEquilibri
     return _move_onto_node(piece, condition, at)
 
 
-def _opposite(beyond: PieceOfPath, condition: Condition) -> tuple[str, bool | None]:
+def _condition_beyond(beyond: PieceOfPath, condition: Condition) -> tuple[str, bool | None]:
     """Return kind and end of the condition that is met from the other side of a change."""
     if condition.kind == "closes":
         return "spreads", None
@@ -110,8 +110,8 @@ def _stop_lost(at: PathEquilibrium, message: str, item: Contact, **words: str) -
     return PathStop(WhyStopped.LOST, at.drive, message.format(names=describe(item), **words))
 
 
-def _mark(piece: PieceOfPath, condition: Condition) -> str:
-    """Return what a contact has come to."""
+def _describe_mark(piece: PieceOfPath, condition: Condition) -> str:
+    """Return the words for the node, corner or step that a contact has reached."""
     beam = piece.whole.mesh.fits.network.beams[condition.item.beam]
     if condition.mark in (0.0, 1.0):
         return f"node {beam.end if condition.last else beam.start!r}"
@@ -167,12 +167,12 @@ def _locate_touch(
 
 
 def _is_beside_kink(piece: PieceOfPath, condition: Condition, at: PathEquilibrium, parameter: float) -> bool:
-    """Return True if a place is near where the same touches, in a beam that shears: it lies there."""
+    """Return True if a side that shears touches so near to a place that its kink lies there."""
     mesh, z, beam = piece.whole.mesh, piece.whole.values(at.x, at.drive), condition.item.beam
     section = mesh.fits.network.beams[beam].section
     places = [float(z[contact.slide]) for contact in mesh.contacts if contact.number == condition.number]
-    near = KINK_REACH * section.thinnest / mesh.fits[beam].length
-    return section.shear and any(abs(place - parameter) < near for place in places)
+    distance = KINK_REACH * section.thinnest / mesh.fits[beam].length
+    return section.shear and any(abs(place - parameter) < distance for place in places)
 
 
 def _is_parallel(piece: PieceOfPath, condition: Condition, at: PathEquilibrium) -> bool:
@@ -287,7 +287,7 @@ def _locate_zero(piece: PieceOfPath, step: StepBetween, row: int) -> PathEquilib
 def row_rate(piece: PieceOfPath, at: PathEquilibrium, row: int) -> float:
     """Return how a row of `PieceOfPath.values` changes with the drive at an equilibrium."""
     step = RATE_STEP / max(1.0, float(np.abs(at.rate).max(initial=0.0)))
-    sides = [at._replace(x=at.x + way * at.rate, drive=at.drive + way) for way in (step, -step)]
+    sides = [at._replace(x=at.x + change * at.rate, drive=at.drive + change) for change in (step, -step)]
     ahead, behind = (piece.row_value(side, row) for side in sides)
     return (ahead - behind) / (2 * step)
 
@@ -306,7 +306,7 @@ def enter_side_change(piece: PieceOfPath, change: ContactChange, sense: float) -
         entered = _enter_located(change, condition, change.piece)
     else:
         ways = {"tangent": _move_into_beam, "spreads": _part_contact, "wraps": _lie_from_root}
-        entered = ways[condition.kind](piece, change) if condition.kind in ways else _lay(piece, change, sense)
+        entered = ways[condition.kind](piece, change) if condition.kind in ways else _lay_or_free(piece, change, sense)
     if entered is None:
         return _stop_lost(change.at, NO_WAY, piece.whole.mesh.fits.network.contacts[change.contact])
     beyond, at, grows = entered
@@ -333,7 +333,7 @@ def _enter_located(change: ContactChange, condition: Condition, beyond: PieceOfP
         return None
     if condition.kind == "touch":
         return beyond, at, beyond.grows_along(at, change.number)
-    kind, last = _opposite(beyond, condition)
+    kind, last = _condition_beyond(beyond, condition)
     return beyond, at, row_rate(beyond, at, beyond.conditions.find_row(kind, condition.item, last))
 
 
@@ -417,7 +417,7 @@ def _lie_from_root(piece: PieceOfPath, change: ContactChange, free: bool = False
     return beyond, beyond.grow(solved), float(solved.rate[slide]) * (-1.0 if condition.last else 1.0)
 
 
-def _lay(piece: PieceOfPath, change: ContactChange, sense: float) -> Entered | None:
+def _lay_or_free(piece: PieceOfPath, change: ContactChange, sense: float) -> Entered | None:
     """Return the piece in which a free part lies on an obstacle, or one that lay there is free; the drive goes on."""
     condition: Any = change.condition
     mesh, z = piece.whole.mesh, piece.whole.values(change.at.x, change.at.drive)

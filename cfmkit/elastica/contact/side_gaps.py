@@ -160,7 +160,7 @@ def _rows_at(degree: int, places: FloatArray) -> _RowsAtPlaces:
 
 @lru_cache(maxsize=64)
 def find_line_tables(degree: int) -> LineTables:
-    """Return what compiled code needs to follow lines."""
+    """Return the tables of shape functions with which compiled code follows lines."""
     fractions = _even_angles()
     at, rule = _rows_at(degree, fractions), basis(degree)
     parts = fractions, rule.weights, at.values.T, at.integrals.T, at.interpolation.T, _series_matrix(degree)
@@ -190,7 +190,7 @@ def join_sides(sides: Sequence[SideData]) -> SideData:
 def search_sides(
     mesh: Discretisation, sides: SideData, z: FloatArray, stage: LoadStage, watch: bool = False
 ) -> FloatArray | None:
-    """Return what compiled code finds of the gaps of sides in n states, (n, sides, 5); None without it."""
+    """Return the least gaps of sides in n states by compiled code, (n, sides, 5); None without it."""
     if not len(z):
         return None
     rows: FloatArray | None = equations(mesh).search_sides(z, stage.rows(), sides, find_line_tables(mesh.degree), watch)
@@ -258,7 +258,7 @@ class SideGaps:
         return gap, slope, seen
 
     def _measure_line(self, lines: ElementLines, fractions: FloatArray) -> MeasuredGaps:
-        """Return the same with the kinks of beams that shear."""
+        """Return gaps and slopes at fractions of elements, the kinks of beams that shear included."""
         seen = lines.evaluate(fractions)
         value, normal = self.distance(seen.place, lines.z, lines.stage)
         if line_leaves_normal(self.section):
@@ -272,8 +272,8 @@ class SideGaps:
     def find_kinks(self, lines: ElementLines) -> FloatArray:
         """Return how steeply the gap falls from contacts at both ends of elements in n states, (n, m, 2)."""
         numbers, sides = lines.elements, self.mesh.side_contacts
-        own: list[Any] = [contact for contact in sides if contact.item.name == self.item.name]
-        pressed = [contact.element for contact in own if contact.item.beam == self.item.beam]
+        contacts: list[Any] = [contact for contact in sides if contact.item.name == self.item.name]
+        pressed = [contact.element for contact in contacts if contact.item.beam == self.item.beam]
         gap, slope, _ = self._measure_line(lines, np.array([0.0, 1.0]))
         at_pad = np.isin(numbers, self.touched)[:, None] & (np.abs(gap) < BESIDE_CONTACT)
         ends = np.stack([np.isin(numbers - 1, pressed), np.isin(numbers, pressed)], axis=1) | at_pad
@@ -336,10 +336,10 @@ class SideGaps:
         sections = [mesh.fits.network.beams[beam].section for beam in beams]
         if any(section.shear or isinstance(section.thickness, Taper) for section in sections):
             return None
-        half, own, partner = half_thickness_of(mesh, item.beam), len(self.elements), self.partner_elements
-        elements = np.zeros((own + len(partner), 2))
-        elements[:own, 0], elements[:own, 1], elements[own:, 0] = self.elements, self.slack, partner
-        numbers = np.array([[0, own, half, mesh.scales.length, 0, *counts, *circle, own, len(partner)]], float)
+        half, count, partner = half_thickness_of(mesh, item.beam), len(self.elements), self.partner_elements
+        elements = np.zeros((count + len(partner), 2))
+        elements[:count, 0], elements[:count, 1], elements[count:, 0] = self.elements, self.slack, partner
+        numbers = np.array([[0, count, half, mesh.scales.length, 0, *counts, *circle, count, len(partner)]], float)
         return SideData(elements, numbers, edge)
 
     @cached_property

@@ -298,7 +298,7 @@ class SlidingEquations(EquationsWithNodes):
         return all(has_polynomial_angle(self.mesh.fits.network.beams[beam]) for beam in beams)
 
     def _differentiate_plain(self, place: float, z: FloatArray, number: int) -> FloatArray:
-        """Return the same exactly: tables of plain beams may have complex ends."""
+        """Return that change exactly, by complex steps: tables of plain beams may have complex ends."""
         moving: Any = self.mesh.moving
         places = z[moving.places] + 0j
         places[number] += 1j * COMPLEX_STEP

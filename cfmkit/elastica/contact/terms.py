@@ -36,15 +36,15 @@ def measure(mesh: Discretisation, contact: ContactAt, z: Any) -> MeasuredGap:
         return MeasuredGap(item.gap - item.sense * z[turn], np.array([turn]), np.array([-item.sense]), np.zeros((1, 1)))
     arm, jacobian = at.arm[0], at.jacobian[0]
     if isinstance(item, Stop):
-        normal = -_direction(item)
+        normal = -_unit_direction(item)
         value = item.gap / length + normal @ (at.place[0] - _place_at_rest(mesh, contact))
         hessian = np.zeros((3, 3), jacobian.dtype)
     else:
         assert isinstance(item, NodeOnObstacle)
-        found = item.outline.distance(at.place[0] * length)
-        normal, value = found.normal, (found.value - item.radius) / length
+        nearest = item.outline.distance(at.place[0] * length)
+        normal, value = nearest.normal, (nearest.value - item.radius) / length
         across = np.array([normal[1], -normal[0]]) @ jacobian
-        hessian = found.curvature * length * np.outer(across, across)
+        hessian = nearest.curvature * length * np.outer(across, across)
     hessian[2, 2] -= normal @ arm
     return MeasuredGap(value, at.unknowns[0, :3], normal @ jacobian, hessian)
 
@@ -56,7 +56,7 @@ def gaps(mesh: Discretisation, contact: ContactAt, z: Any) -> Any:
         return item.gap - item.sense * z[:, mesh.attachments.unknowns[contact.place, 3]]
     place = poses(mesh.attachments, z, [contact.place]).place[:, 0]
     if isinstance(item, Stop):
-        return item.gap / length - (place - _place_at_rest(mesh, contact)) @ _direction(item)
+        return item.gap / length - (place - _place_at_rest(mesh, contact)) @ _unit_direction(item)
     assert isinstance(item, NodeOnObstacle)
     return (item.outline.distance(place * length).value - item.radius) / length
 
@@ -70,13 +70,13 @@ def slip_way(mesh: Discretisation, contact: ContactAt, z: Any, near: float | Non
     at = poses(mesh.attachments, z, [contact.place])
     place, jacobian, radius = at.place[0], at.jacobian[0], 0.0
     if isinstance(item, Stop):
-        normal = -_direction(item)
+        normal = -_unit_direction(item)
         along = np.array([normal[1], -normal[0]])
         value, bend = along @ (place - _place_at_rest(mesh, contact)), np.zeros((2, 2))
     else:
         assert isinstance(item, NodeOnObstacle)
-        way, round_length = item.outline.way_along(place * length, item.radius), item.outline.round_length(item.radius)
-        value, along, bend = way.value / length, way.gradient, way.hessian * length
+        slip, round_length = item.outline.way_along(place * length, item.radius), item.outline.round_length(item.radius)
+        value, along, bend = slip.value / length, slip.gradient, slip.hessian * length
         if near is not None and np.isfinite(round_length):
             value = value - np.rint((np.real(value) - near) * length / round_length) * round_length / length
         radius = item.radius / length
@@ -132,18 +132,18 @@ def contact_contribution(mesh: Discretisation, contact: ContactAt, z: Any) -> Co
     With friction it has no functional where it slips: its matrix is not symmetric. Flag and anchor of a state keep the
     values that they have.
     """
-    gap, force, own = measure(mesh, contact, z), z[contact.unknown], contact.own_unknowns
+    gap, force, extra = measure(mesh, contact, z), z[contact.unknown], contact.own_unknowns
     motions, slip = gap.unknowns, None
     if contact.rub >= 0:
         state = friction_of(contact, z)
         slip = slip_way(mesh, contact, z, state.anchor)
         motions = np.union1d(gap.unknowns, slip.unknowns)
-    unknowns, count, size = np.append(motions, own), len(motions), len(motions) + len(own)
+    unknowns, count, size = np.append(motions, extra), len(motions), len(motions) + len(extra)
     kind = np.result_type(gap.value, gap.gradient, gap.hessian, z.dtype)
     gradient, hessian = np.zeros(size, kind), np.zeros((size, size), kind)
     hessian[range(count, size), range(count, size)] = -1.0
     if not is_closed(contact, z, gap.value):
-        forces = list(own[:2])
+        forces = list(extra[:2])
         gradient[count : count + len(forces)] = -z[forces]
         return Contribution(0.0 * force, unknowns, gradient, hessian)
     soft, pressing = compliance(mesh, contact), np.searchsorted(motions, gap.unknowns)
@@ -165,7 +165,7 @@ def contact_contribution(mesh: Discretisation, contact: ContactAt, z: Any) -> Co
     return Contribution(0.5 * soft * force**2, unknowns, gradient, hessian)
 
 
-def _direction(stop: Stop) -> Any:
+def _unit_direction(stop: Stop) -> Any:
     assert stop.direction is not None
     return np.array([np.cos(stop.direction), np.sin(stop.direction)])
 

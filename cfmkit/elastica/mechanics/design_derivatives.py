@@ -179,20 +179,20 @@ def _term_slopes(
 def _is_stepped(network: Discretisation, acting: Attached | ContactAt) -> bool:
     """Return True if a number of what acts on attachments, or of these, has a complex step."""
     places = [acting.place] if isinstance(acting, ContactAt) else list(acting.places)
-    own = vars(acting.item).values()
-    numbers = [value for value in own if isinstance(value, complex | tuple | np.ndarray | np.number)]
+    fields = vars(acting.item).values()
+    numbers = [value for value in fields if isinstance(value, complex | tuple | np.ndarray | np.number)]
     arrays = [getattr(network.attachments, name)[places] for name in ("origin", "arm", "frame")]
     return any(bool(np.imag(np.asarray(value)).any()) for value in (*numbers, *arrays))
 
 
 def _held_forces(at: Equilibria, motions: FloatArray) -> FloatArray:
     """Return the derivatives of the effort by the values of held unknowns, (p, size); zero at free ones."""
-    mesh, found = at.mesh, np.zeros(at.z.shape)
+    mesh, forces = at.mesh, np.zeros(at.z.shape)
     held = np.setdiff1d(np.arange(mesh.size), mesh.free)
     for k, (z, drive) in enumerate(zip(at.z, at.drive, strict=True)):
         tangent = energy.hessian(mesh, z, drive)
-        found[k, held] = motions[k] @ tangent[:, held]
-    return found
+        forces[k, held] = motions[k] @ tangent[:, held]
+    return forces
 
 
 def unknown_slopes(at: Equilibria, designs: NetworkDesigns, forces: FloatArray) -> FloatArray:
@@ -201,15 +201,15 @@ def unknown_slopes(at: Equilibria, designs: NetworkDesigns, forces: FloatArray) 
     Raises LinAlgError if a tangent is singular.
     """
     mesh, chosen = at.mesh, at.mesh.free
-    own = equations(mesh)
-    found = np.zeros((len(at.z), designs.count, mesh.size))
+    system = equations(mesh)
+    slopes = np.zeros((len(at.z), designs.count, mesh.size))
     if designs.held_slopes is not None:
-        found += designs.held_slopes
+        slopes += designs.held_slopes
     for k, (z, drive) in enumerate(zip(at.z, at.drive.tolist(), strict=True)):
-        found[k][:, chosen] = own.resolve(z[chosen], drive, -forces[k][:, chosen])[0]
-    if not np.isfinite(found).all():
+        slopes[k][:, chosen] = system.resolve(z[chosen], drive, -forces[k][:, chosen])[0]
+    if not np.isfinite(slopes).all():
         raise np.linalg.LinAlgError("the tangent is singular")
-    return found
+    return slopes
 
 
 def force_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
@@ -222,17 +222,17 @@ def force_slopes(at: Equilibria, designs: NetworkDesigns) -> FloatArray:
     stepped, held = dual_arrays(designs), designs.held_slopes
     if held is not None:
         moved = DualArray(at.z, held[:, None])
-    found = np.zeros((len(at.z), designs.count, mesh.size))
+    totals = np.zeros((len(at.z), designs.count, mesh.size))
     together = max(1, MAX_TOGETHER // (designs.count * mesh.elements.angle.size))
     for first in range(0, len(at.z), together):
         some = slice(first, first + together)
         for columns, force in energy.element_forces(stepped, moved[some], at.drive[some], 1.0):
             change = np.moveaxis(slopes_of(force, designs.count, force.shape), 0, 1)
-            for element, own in enumerate(unknowns[:, list(columns)]):  # all different, unlike those of all elements
-                found[some, :, own] += change[:, :, element]
-    for k, d, own, slopes in _term_slopes(at, designs, held):
-        np.add.at(found[k, d], own, slopes)
-    return found
+            for element, rows in enumerate(unknowns[:, list(columns)]):  # all different, unlike those of all elements
+                totals[some, :, rows] += change[:, :, element]
+    for k, d, rows, slopes in _term_slopes(at, designs, held):
+        np.add.at(totals[k, d], rows, slopes)
+    return totals
 
 
 def dual_arrays(designs: NetworkDesigns) -> Discretisation:

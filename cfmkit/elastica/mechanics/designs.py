@@ -44,7 +44,7 @@ class NetworkDesigns:
     @cached_property
     def held_slopes(self) -> FloatArray | None:
         """Derivatives of all unknowns where they are held, (d, size), by complex steps; None if none has any."""
-        if all(own is self.held[0] for own in self.held):
+        if all(values is self.held[0] for values in self.held):
             return None
         steps = np.imag(join_held(self.held, self.template.size)) / COMPLEX_STEP
         return steps if steps.any() else None
@@ -65,14 +65,14 @@ def set_up(
 
 
 def make_up(network: Network) -> Any:
-    """Return what networks of one topology share: nodes, beams, joints, supports, links, and what acts on them."""
+    """Return the make-up of a network: names and kinds of its nodes, beams, joints, supports, links, springs, loads."""
     nodes = [
         (name, node.support.along, node.support.across, node.support.rotation) for name, node in network.nodes.items()
     ]
     beams = [(name, b.start, b.end, b.start_joint, b.end_joint) for name, b in network.beams.items()]
     acting = [
-        (type(one), *(getattr(one, name, None) for name in ("node", "start", "end", "beam", "follows")))
-        for one in (*network.springs, *network.loads)
+        (type(item), *(getattr(item, name, None) for name in ("node", "start", "end", "beam", "follows")))
+        for item in (*network.springs, *network.loads)
     ]
     arms = [swings_with_master(network, link.node) for link in network.links if not link.turns]
     return nodes, beams, network.links, arms, acting, [type(contact) for contact in network.contacts]

@@ -52,7 +52,7 @@ def element_tables(
     cuts: FloatArray,
 ) -> dict[str, Any]:
     """Return the tables of the elements between cuts of the beams, one beam after the other: (d, e, q) or (d, e)."""
-    beams, bundle, numbers = fits[0].network.beams, fits[0].bundle, [own.number for own in fits]
+    beams, bundle, numbers = fits[0].network.beams, fits[0].bundle, [fit.number for fit in fits]
     if not bundle.others:
         return plain_tables(*bundle.rows(numbers), scales, degree, row, cuts)
     wide = any(beam.section.wide for beam in beams.values())
@@ -67,8 +67,8 @@ def element_tables(
             parts.append({column: values[:, first : first + len(between)] for column, values in together.items()})
             first += len(between)
         else:
-            each = [_smooth_tables(own.network.beams[name], own[name], scales, degree, between, wide) for own in fits]
-            parts.append({column: np.array([tables[column] for tables in each]) for column in each[0]})
+            sets = [_smooth_tables(fit.network.beams[name], fit[name], scales, degree, between, wide) for fit in fits]
+            parts.append({column: np.array([tables[column] for tables in sets]) for column in sets[0]})
     return {column: np.concatenate([part[column] for part in parts], axis=1) for column in parts[0]}
 
 
@@ -86,9 +86,9 @@ def plain_tables(
 ) -> dict[str, Any]:
     """Return the tables of elements of plain beams of d networks, (d, e, q) each."""
     rule, force, width = basis(degree), scales.force, cuts[:, 1:] - cuts[:, :1]
-    t, own, angle = cuts[:, :1] + width * rule.places, coefficients[..., row, :], 0.0
-    for k in reversed(range(own.shape[-1])):
-        angle = angle * t + own[..., k, None]
+    t, c, angle = cuts[:, :1] + width * rule.places, coefficients[..., row, :], 0.0
+    for k in reversed(range(c.shape[-1])):
+        angle = angle * t + c[..., k, None]
     speed, ones = length[..., row, None] / scales.length * width, np.ones(len(rule.places))
     bending, axial, shear = (values[..., row, None] for values in rigidities)
     return {
@@ -108,9 +108,9 @@ def _smooth_tables(
     """Return the tables of the elements of a beam, those of one smooth part after the other."""
     parts, middle = list[dict[str, Any]](), 0.5 * (cuts[:, 0] + cuts[:, 1])
     for begin, end in itertools.pairwise(smooth_marks(beam, fitted)):
-        own = cuts[(begin <= middle) & (middle < end)]
-        if len(own):  # else the marks are at one place but for rounding
-            parts.append(smooth_tables(beam, fitted, scales, degree, own, 0.5 * (begin + end), wide))
+        inside = cuts[(begin <= middle) & (middle < end)]
+        if len(inside):  # else the marks are at one place but for rounding
+            parts.append(smooth_tables(beam, fitted, scales, degree, inside, 0.5 * (begin + end), wide))
     return {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
 
 

@@ -44,8 +44,8 @@ def fill_arrays(
     fits: Sequence[BeamFits],  # of their beams
     driven: DrivenNode | None,  # of all of them
 ) -> NetworkArrays:
-    """Return what is different in networks of one topology."""
-    n, length, bundle, numbers = numbering, scales.length, fits[0].bundle, [own.number for own in fits]
+    """Return the arrays of d networks of one topology in which they differ."""
+    n, length, bundle, numbers = numbering, scales.length, fits[0].bundle, [fit.number for fit in fits]
     tables = element_tables(fits, scales, n.topology.degree, n.row, cuts)
     spots = bundle.spots[numbers]
     masters = spots[:, n.master]
@@ -61,7 +61,7 @@ def fill_arrays(
     tables["line"], tables["gap"] = _line_loads(n, scales, pairs), np.zeros((len(pairs), len(n.row), 2))
     raw = [beam.closure == "raw" for beam in pairs[0][0].beams.values()]
     if any(raw):
-        tables["gap"] = _gaps(n, tables, places, np.array(raw)[n.row] & (cuts[:, 1] == 1.0))
+        tables["gap"] = _prestress_gaps(n, tables, places, np.array(raw)[n.row] & (cuts[:, 1] == 1.0))
     return NetworkArrays(tables, places, held)
 
 
@@ -75,9 +75,9 @@ def _place_inside(n: Numbering, tables: dict[str, Any], places: dict[str, Any]) 
     ahead, arm, origin = _chords(tables), places["arm"], places["origin"]
     places["origin"] = origin = origin.astype(np.result_type(origin, arm, ahead))
     for beam, first in enumerate(n.beam_ends[:, 0]):
-        own = np.flatnonzero(n.row == beam)[:-1]
+        inner = np.flatnonzero(n.row == beam)[:-1]
         start = (origin[:, first] + arm[:, first])[:, None]
-        origin[:, n.ends[own, 1]] = start + np.cumsum(ahead[:, own], axis=1)
+        origin[:, n.ends[inner, 1]] = start + np.cumsum(ahead[:, inner], axis=1)
 
 
 @lru_cache(maxsize=128)
@@ -95,17 +95,17 @@ def _line_loads(n: Numbering, scales: MechanicsUnits, pairs: Sequence[Loaded]) -
     if not any(isinstance(load, LineLoad) for on in pairs[0] for load in on.loads):
         return np.zeros((len(pairs), len(n.row), 2, 2))
     lines = [(d, grows, load) for d, pair in enumerate(pairs) for grows, on in enumerate(pair) for load in on.loads]
-    given = [(d, grows, load) for d, grows, load in lines if isinstance(load, LineLoad)]
-    kinds = {type(value) for _, _, load in given for value in (load.wx, load.wy)}
+    loads = [(d, grows, load) for d, grows, load in lines if isinstance(load, LineLoad)]
+    kinds = {type(value) for _, _, load in loads for value in (load.wx, load.wy)}
     total = np.zeros((len(pairs), len(n.row), 2, 2), np.result_type(float, *kinds))
-    for d, grows, load in given:
-        own = n.row == list(pairs[d][0].beams).index(load.beam)
+    for d, grows, load in loads:
+        loaded = n.row == list(pairs[d][0].beams).index(load.beam)
         values = np.array([load.wx, load.wy]) * (scales.length / scales.force)
-        total[d, own, grows] += values * scales.drive if grows else values
+        total[d, loaded, grows] += values * scales.drive if grows else values
     return total
 
 
-def _gaps(n: Numbering, tables: dict[str, Any], places: dict[str, Any], last: Any) -> Any:
+def _prestress_gaps(n: Numbering, tables: dict[str, Any], places: dict[str, Any], last: Any) -> Any:
     """Return by how much the last elements of beams that are forced into place miss their nodes, (d, e, 2)."""
     place = places["origin"] + places["arm"]
     span = place[:, n.ends[:, 1]] - place[:, n.ends[:, 0]]
@@ -123,10 +123,10 @@ def _hold_bodies(
     frames, values, before = list[Any](), list[dict[int, Any]](), None
     for network, drive in pairs:
         nodes = network.nodes
-        own = [nodes[name].support for name in nodes], drive.direction if turned else 0.0  # type: ignore[union-attr]
-        if own != before:
-            frame = frame_of(n, *(own[1] if name == turned else nodes[name].support.direction for name in nodes))
-            held, before = dict[int, Any](), own
+        directions = [nodes[name].support for name in nodes], drive.direction if turned else 0.0  # type: ignore[union-attr]
+        if directions != before:
+            frame = frame_of(n, *(directions[1] if name == turned else nodes[name].support.direction for name in nodes))
+            held, before = dict[int, Any](), directions
             for name, (along, across, rotation) in n.bodies.items():
                 support = nodes[name].support
                 if support.along:
@@ -144,7 +144,7 @@ def _hold_bodies(
 
 def join_held(held: list[dict[int, Any]], size: int) -> Any:
     """Return the values of held unknowns of d networks, (d, size); zero where nothing is held."""
-    values = np.array([list(own.values()) for own in held]).reshape(len(held), -1)
+    values = np.array([list(values_held.values()) for values_held in held]).reshape(len(held), -1)
     base = np.zeros((len(held), size), np.result_type(float, values.dtype))
     base[:, list(held[0])] = values
     return base

@@ -95,11 +95,11 @@ def number(topology: Topology) -> Numbering:
     acting = tuple(tuple(attach(name) for name in names) for names in topology.acting)
     nodes = {name: attach(name) for name in topology.nodes}
     touching = tuple(attach(name) for name in topology.touching)
-    n_ends, count, each = next(fresh), len(ends), topology.degree - 1
-    n_motions = n_ends + count * each
+    n_ends, count, n_bubbles = next(fresh), len(ends), topology.degree - 1
+    n_motions = n_ends + count * n_bubbles
     unknowns_of_places, at, masters = zip(*places, strict=True)
     taken, pairs = np.array(unknowns_of_places), np.array(ends)
-    bubbles = n_ends + np.arange(count * each).reshape(count, -1)
+    bubbles = n_ends + np.arange(count * n_bubbles).reshape(count, -1)
     forces = n_motions + np.arange(2 * count).reshape(count, 2)
     unknowns = np.concatenate([taken[pairs[:, 0]], taken[pairs[:, 1]], bubbles, forces], axis=1)
     last = np.full(n_motions + 2 * count, -1)

@@ -76,19 +76,19 @@ def slopes_at_points(degree: int) -> FloatArray:
     return read_only(2 * np.stack(slopes, axis=1) @ np.linalg.inv(legendre.legvander(x, count - 1)))
 
 
-def integrals(known: FloatArray, ends: FloatArray) -> FloatArray:
+def integrals(places: FloatArray, ends: FloatArray) -> FloatArray:
     """Return the matrix that takes values at n places to the integrals from 0 to ends, (m, n).
 
     Exact for polynomials of degree n - 1 in u.
     """
-    count = len(known)
-    series = np.linalg.inv(legendre.legvander(2 * known - 1, count - 1))
+    count = len(places)
+    series = np.linalg.inv(legendre.legvander(2 * places - 1, count - 1))
     primitives = [legendre.legval(2 * ends - 1, legendre.legint(unit, lbnd=-1)) for unit in np.eye(count)]
     return read_only(np.stack(primitives, axis=1) @ series / 2)
 
 
-def interpolation(known: FloatArray, places: FloatArray) -> FloatArray:
+def interpolation(nodes: FloatArray, places: FloatArray) -> FloatArray:
     """Return the matrix that takes values at n places to values at others, (m, n), by the polynomial through them."""
-    count = len(known)
-    series = np.linalg.inv(legendre.legvander(2 * known - 1, count - 1))
+    count = len(nodes)
+    series = np.linalg.inv(legendre.legvander(2 * nodes - 1, count - 1))
     return read_only(legendre.legvander(2 * places - 1, count - 1) @ series)

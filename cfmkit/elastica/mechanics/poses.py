@@ -52,8 +52,8 @@ def poses(attachments: Attachments, z: Any, which: Any) -> AttachmentPoses:
     unknowns, frame = attachments.unknowns[which], attachments.frame[which]
     cos, sin = frame[:, 0], frame[:, 1]
     x, y, turn = z[..., unknowns[:, 0]], z[..., unknowns[:, 1]], z[..., unknowns[:, 2]]
-    given = attachments.arm[which]
-    ax, ay, (c, s) = given[:, 0], given[:, 1], cos_sin(turn)
+    offsets = attachments.arm[which]
+    ax, ay, (c, s) = offsets[:, 0], offsets[:, 1], cos_sin(turn)
     arm = stack([c * ax - s * ay, s * ax + c * ay])
     place = stack([cos * x - sin * y, sin * x + cos * y]) + attachments.origin[which] + arm
     return AttachmentPoses(place, arm, frame, unknowns)

@@ -46,7 +46,7 @@ def bending(elements: BeamElements, curvature: Any) -> Bending:
     if elements.curl is None:
         return Bending(narrow, elements.rigidity * curvature, elements.rigidity + 0.0 * curvature, 0.0, 0.0, 0.0)
     n, whole = elements.hindrance, curvature + elements.rest
-    g, first, second = _share(elements.curl * whole**2)
+    g, first, second = _curling_share_or_dual(elements.curl * whole**2)
     stiff, by = 1 + n * (1 - g), 2 * elements.curl * whole
     rising, curved = -n * first * by, -n * (second * by**2 + 2 * elements.curl * first)
     moment = elements.rigidity * (curvature * stiff + curvature**2 / 2 * rising)
@@ -59,7 +59,7 @@ def bending_moment(elements: BeamElements, curvature: Any) -> Any:
     return elements.rigidity * curvature if elements.curl is None else bending(elements, curvature).moment
 
 
-def _share(z: Any) -> tuple[Any, ...]:
+def _curling_share_or_dual(z: Any) -> tuple[Any, ...]:
     return map_analytic(curling_share, z) if isinstance(z, DualArray) else curling_share(z)
 
 
@@ -73,8 +73,8 @@ def curling_share(z: Any) -> tuple[Any, Any, Any]:
     [1.0, 0.994488, 0.02]
     """
     small = np.real(z) < 1.0
-    near, far = _sum_series(np.where(small, z, 0.0)), _closed_form(np.where(small, 1.0, z))
-    g, first, second = (np.where(small, *pair) for pair in zip(near, far, strict=True))
+    series, far = _sum_series(np.where(small, z, 0.0)), _closed_form(np.where(small, 1.0, z))
+    g, first, second = (np.where(small, *pair) for pair in zip(series, far, strict=True))
     return g, first, second
 
 
@@ -99,15 +99,15 @@ def _closed_form(z: Any) -> tuple[Any, Any, Any]:
     return g, once / (4 * th**3), (twice - 3 * once / th) / (16 * th**6)
 
 
-def _quotient(top: list[float], below: list[float]) -> tuple[float, ...]:
+def _divide_series(top: list[float], below: list[float]) -> tuple[float, ...]:
     """Return the power series of a quotient of two."""
-    found: list[float] = []
+    quotient: list[float] = []
     for k, value in enumerate(top):
-        found.append((value - sum(found[j] * below[k - j] for j in range(k))) / below[0])
-    return tuple(found)
+        quotient.append((value - sum(quotient[j] * below[k - j] for j in range(k))) / below[0])
+    return tuple(quotient)
 
 
-SERIES_COEFFICIENTS = _quotient(
+SERIES_COEFFICIENTS = _divide_series(
     [2 / factorial(4 * k + 2) for k in range(N_TERMS)], [1 / factorial(4 * k + 1) for k in range(N_TERMS)]
 )
 """Coefficients of g as a power series of th^4."""

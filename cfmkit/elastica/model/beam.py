@@ -151,7 +151,7 @@ def fit(
     if not np.real(distance) > 0:
         raise InputError(f"the ends of the beam {beam.start}-{beam.end} coincide")
     course = beam.shape.course(distance)
-    (cx, cy), length = _integral(course)
+    (cx, cy), length = _chord_and_length(course)
     shape_chord = (cx * cx + cy * cy) ** 0.5
     if not np.real(shape_chord) > 1e-9 * np.real(length):
         raise InputError(f"the shape of the beam {beam.start}-{beam.end} returns to its start: it cannot be fitted")
@@ -189,7 +189,7 @@ def _fix_breaks(fitted: Fit, beam: Beam, known: Fit | None) -> Fit:
             marks, steps = np.insert(marks, k, t), np.insert(steps, k, step)
         elif not _has_corner(fitted.course, t):
             steps[k] = step
-        elif _has_step(beam.section, station) and abs(step) > _ANGLE_TOL * _change(fitted.course):
+        elif _has_step(beam.section, station) and abs(step) > _ANGLE_TOL * _step_changes(fitted.course):
             raise InputError(
                 f"a corner of the beam {beam.start}-{beam.end} and a step of its thickness move past each other: "
                 "no derivative there"
@@ -224,7 +224,7 @@ def _station_step(beam: Beam, station: float) -> float:
     return float(steps[0])
 
 
-def _change(course: FittedShape) -> float:
+def _step_changes(course: FittedShape) -> float:
     """Return by how much complex steps change angle and, relatively, speed at the middles of a course's pieces."""
     middles = (0.5 * (course.breaks[1:] + course.breaks[:-1])).tolist()
     angles = [abs(np.imag(course.angle(t, t))) for t in middles]
@@ -241,7 +241,7 @@ def _turn_of(course: FittedShape, left: Any, right: Any) -> float:
     return float(np.abs(np.diff(angles)).sum())
 
 
-def _integral(course: FittedShape) -> tuple[tuple[Any, Any], Any]:
+def _chord_and_length(course: FittedShape) -> tuple[tuple[Any, Any], Any]:
     """Return the integrals of (cos, sin) of the angle and of the speed over a whole course."""
     x: Any = 0.0
     y: Any = 0.0

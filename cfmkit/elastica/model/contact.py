@@ -205,13 +205,13 @@ def _choose_nearest(parts: list[tuple[Distance, Any]], values: Sequence[tuple[An
 def line_edge(through: Sequence[float], direction: float) -> ObstacleEdge:
     """Return a straight line through a point [m], along a direction [rad]; the free side is to its left."""
     along = np.array([[math.cos(direction), math.sin(direction)]])
-    return _outline([np.asarray(through, float)], along, [0.0], [])
+    return _make_edge([np.asarray(through, float)], along, [0.0], [])
 
 
 def circle_edge(centre: Sequence[float], radius: float, hole: bool = False) -> ObstacleEdge:
     """Return a disc, free outside, or a hole, free inside [m]."""
     arc = (np.asarray(centre, float), radius, 0.0, math.tau, -1.0 if hole else 1.0)
-    return _outline([], [], [], [arc], closed=True)
+    return _make_edge([], [], [], [arc], closed=True)
 
 
 def polyline_edge(points: Sequence[Sequence[float]], fillet: float, closed: bool = False) -> ObstacleEdge:
@@ -228,7 +228,7 @@ def polyline_edge(points: Sequence[Sequence[float]], fillet: float, closed: bool
     along = sides / length[:, None]
     count = len(length)
     turning = [(k, (k + 1) % count) for k in range(count if closed else count - 1)]
-    turn = np.array([_turn(along[a], along[b]) for a, b in turning])
+    turn = np.array([_angle_between(along[a], along[b]) for a, b in turning])
     if (np.abs(turn) > math.pi - 1e-6).any():
         raise ValueError("it turns back on itself at a corner")
     cut = np.zeros((count, 2))  # of every side, by the corner at its begin and at its end
@@ -247,7 +247,7 @@ def polyline_edge(points: Sequence[Sequence[float]], fillet: float, closed: bool
         begin = ring[a + 1] - along[a] * cut[a, 1]
         centre = begin + bend * fillet * np.array([-along[a][1], along[a][0]])
         arcs.append((centre, fillet, math.atan2(*(begin - centre)[::-1]), angle, -bend))
-    return _outline(ring[:-1] + along * cut[:, :1], along, np.maximum(left, 0.0), arcs, closed)
+    return _make_edge(ring[:-1] + along * cut[:, :1], along, np.maximum(left, 0.0), arcs, closed)
 
 
 def arc_edge(centre: Sequence[float], radius: float, start: float, end: float) -> ObstacleEdge:
@@ -259,17 +259,17 @@ def arc_edge(centre: Sequence[float], radius: float, start: float, end: float) -
     first, last = (np.array([math.cos(angle), math.sin(angle)]) for angle in (high, low))
     along = np.array([[first[1], -first[0]], [last[1], -last[0]]])  # clockwise: the disc is to the right
     starts = [middle + radius * first, middle + radius * last]
-    return _outline(starts, along, [0.0, 0.0], [(middle, radius, high, low - high, 1.0)])
+    return _make_edge(starts, along, [0.0, 0.0], [(middle, radius, high, low - high, 1.0)])
 
 
-def _outline(start: Any, along: Any, length: Any, arcs: Sequence[Any], closed: bool = False) -> ObstacleEdge:
+def _make_edge(start: Any, along: Any, length: Any, arcs: Sequence[Any], closed: bool = False) -> ObstacleEdge:
     centre = np.array([arc[0] for arc in arcs], float).reshape(-1, 2)
     radius, first, sweep, bulge = (np.array([arc[k] for arc in arcs], float) for k in range(1, 5))
     starts, ways = np.asarray(start, float).reshape(-1, 2), np.asarray(along, float).reshape(-1, 2)
     return ObstacleEdge(starts, ways, np.asarray(length, float), centre, radius, first, sweep, bulge, closed)
 
 
-def _turn(first: FloatArray, second: FloatArray) -> float:
+def _angle_between(first: FloatArray, second: FloatArray) -> float:
     """Return the angle from one unit vector to another [rad]."""
     return math.atan2(float(first[0] * second[1] - first[1] * second[0]), float(first @ second))
 

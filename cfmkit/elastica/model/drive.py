@@ -37,7 +37,7 @@ class Displacement(ShortRepr):
     loads: tuple[LoadOn, ...] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", _points(self.points))
+        object.__setattr__(self, "points", _check_points(self.points))
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Rotation:
     loads: tuple[LoadOn, ...] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", _points(self.points))
+        object.__setattr__(self, "points", _check_points(self.points))
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Loading:
     points: FloatArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", _points(self.points))
+        object.__setattr__(self, "points", _check_points(self.points))
         if not self.loads or not all(isinstance(load, PointLoad | LineLoad) for load in self.loads):
             raise InputError("a load drive needs at least one load")
 
@@ -111,7 +111,7 @@ class Control:
             raise InputError(f"first_step must be above 0 and at most 1, got {self.first_step}")
 
 
-def _points(points: FloatArray) -> FloatArray:
+def _check_points(points: FloatArray) -> FloatArray:
     array = read_only(np.atleast_1d(np.asarray(points, dtype=float)))
     if array.ndim != 1 or len(array) == 0 or not np.isfinite(array).all():
         raise InputError("a drive needs a list of finite points")
@@ -136,7 +136,7 @@ class DrivenNode(NamedTuple):
 
 
 def find_driven_node(network: Network, drive: Drive) -> DrivenNode | None:
-    """Return what a drive moves; None if the drive prescribes loads.
+    """Return the node and the motion that a drive prescribes; None if it prescribes loads.
 
     Directions may be complex (derivatives are taken by complex steps); their real parts decide.
 

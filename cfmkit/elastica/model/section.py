@@ -51,7 +51,7 @@ class Taper:
 
 @dataclass(frozen=True)
 class Section:
-    """A rectangle: `thickness` in the plane of bending, `width` out of it.
+    """A rectangular section: `thickness` in the plane of bending, `width` across it, and deformations that count.
 
     A `wide` one stiffens as its curling across the width is hindered: see `cfmkit.elastica.mechanics.wide_strip`.
     """
@@ -66,11 +66,11 @@ class Section:
     wide: bool = False
 
     def __post_init__(self) -> None:
-        _positive("youngs_modulus", self.youngs_modulus)
-        _positive("width", self.width)
-        _positive("shear_factor", self.shear_factor)
+        _require_positive("youngs_modulus", self.youngs_modulus)
+        _require_positive("width", self.width)
+        _require_positive("shear_factor", self.shear_factor)
         if not isinstance(self.thickness, Taper):
-            _positive("thickness", self.thickness)
+            _require_positive("thickness", self.thickness)
         if not -1 < self.poisson_ratio.real < 0.5 + 1e-12:
             raise InputError(f"poisson_ratio must be between -1 and 0.5, got {self.poisson_ratio}")
 
@@ -167,6 +167,6 @@ def curl_hindered(z: Any) -> Any:
     return np.where(z < 1e-4, z / 180, 1 - g)
 
 
-def _positive(name: str, value: Any) -> None:
+def _require_positive(name: str, value: Any) -> None:
     if not (0 < value.real < inf and abs(value.imag) < inf):
         raise InputError(f"{name} must be positive, got {value}")

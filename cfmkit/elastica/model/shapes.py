@@ -125,7 +125,7 @@ class Polyline:
     points: FloatArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", _points(self.points))
+        object.__setattr__(self, "points", _check_points(self.points))
 
     def course(self, chord: Any) -> FittedShape:
         """Return the course; t is the fraction of the arc length."""
@@ -150,7 +150,7 @@ class Spline:
     points: FloatArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", _points(self.points))
+        object.__setattr__(self, "points", _check_points(self.points))
 
     def course(self, chord: Any) -> FittedShape:
         """Return the course; t is the fraction of the chord polygon's length."""
@@ -238,7 +238,7 @@ class Bent:
 Shape = Polynomial | CosineArch | Polyline | Spline | Bent
 
 
-def _points(points: Any) -> Any:
+def _check_points(points: Any) -> Any:
     array = np.asarray(points)
     array = read_only(array, complex if array.dtype.kind == "c" else float)
     if array.ndim != 2 or array.shape[1] != 2 or len(array) < 2:

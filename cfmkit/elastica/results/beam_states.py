@@ -82,14 +82,14 @@ def states(
 def states_of_elements(net: Network, at: Equilibria, elements: Sequence[int], fractions: Any) -> BeamStates:
     """Return states at the same fractions (k,) of each of m elements, one after the other: (p, m k)."""
     places = np.asarray(fractions, float)
-    by_element = _states(at, list(elements), places, _rest(net, at.mesh, elements, places))
+    by_element = _states(at, list(elements), places, _find_rest(net, at.mesh, elements, places))
     return BeamStates(*map(_join_elements, by_element))
 
 
 def forces_of_elements(net: Network, at: Equilibria, elements: Sequence[int], fractions: Any) -> BeamStates:
-    """Return the same without x and y: stresses need none."""
+    """Return such states without x and y, which stresses do not need."""
     places = np.asarray(fractions, float)
-    states = _forces(at, list(elements), places, _rest(net, at.mesh, elements, places)).states
+    states = _forces(at, list(elements), places, _find_rest(net, at.mesh, elements, places)).states
     return BeamStates(*map(_join_elements, states))
 
 
@@ -106,7 +106,7 @@ def forces_of_designs(
     tables = {name: np.array([getattr(mesh.elements, name) for mesh in meshes])[row] for name in names}
     units = np.array([mesh.scales for mesh in meshes]).T[:, row, None, None]
     mesh = replace(at.mesh, elements=at.mesh.elements._replace(**tables), scales=MechanicsUnits(*units))
-    at_rest = zip(*(_rest(*pair, elements, places) for pair in zip(networks, meshes, strict=True)), strict=True)
+    at_rest = zip(*(_find_rest(*pair, elements, places) for pair in zip(networks, meshes, strict=True)), strict=True)
     rest = _BeamAtRest(*(np.array(column)[row] for column in at_rest))
     states = _forces(replace(at, mesh=mesh), elements, places, rest).states
     widths = np.array([[net.beams[name].section.width for name in at.mesh.elements.beam] for net in networks])
@@ -122,7 +122,7 @@ def states_of_designs(
 ) -> BeamStates:
     """Return states with their derivatives: dual arrays (p, m k), (m k) of those that do not change along the path."""
     places, numbers = np.asarray(fractions, float), list(elements)
-    by_element = _states(at, numbers, places, _rest_of_designs(designs, at.mesh, numbers, places))
+    by_element = _states(at, numbers, places, _unloaded_designs(designs, at.mesh, numbers, places))
     return BeamStates(*map(_join_elements, by_element))
 
 
@@ -143,14 +143,14 @@ class _BeamAtRest(NamedTuple):
     thickness: Any
 
 
-def _rest(net: Network, mesh: Discretisation, elements: Sequence[int], places: FloatArray) -> _BeamAtRest:
+def _find_rest(net: Network, mesh: Discretisation, elements: Sequence[int], places: FloatArray) -> _BeamAtRest:
     """Return beams at fractions of elements before any load."""
     rule, e = basis(mesh.degree), mesh.elements
-    through = _matrices(mesh.degree, tuple(places.tolist())).interpolation
+    through = _matrices_at(mesh.degree, tuple(places.tolist())).interpolation
     bundle = mesh.fits.bundle
     if not bundle.others and e.moved_cuts is None and bundle.coefficients.shape[-1] <= len(rule.places):
         thickness = np.array([net.beams[e.beam[element]].section.thickness for element in elements])
-        return _plain_rest(mesh, elements, places, thickness[:, None])
+        return _unloaded_plain(mesh, elements, places, thickness[:, None])
     rows = []
     for element in elements:
         cuts = e.cuts[element] if e.moved_cuts is None else e.moved_cuts[..., element, :]
@@ -170,14 +170,16 @@ def _rest(net: Network, mesh: Discretisation, elements: Sequence[int], places: F
     return _BeamAtRest(*(np.stack(column, axis=-2) for column in zip(*rows, strict=True)))
 
 
-def _rest_of_designs(
+def _unloaded_designs(
     designs: NetworkDesigns, mesh: Discretisation, elements: list[int], places: FloatArray
 ) -> _BeamAtRest:
     """Return beams at fractions of elements before any load with their derivatives, dual where they have some."""
     template, names = designs.template, [designs.template.elements.beam[element] for element in elements]
     if template.fits.bundle.others:
-        template_beam = _rest(template.fits.network, template, elements, places)
-        beams = [_rest(net, design_of(designs, d), elements, places) for d, (net, _) in enumerate(designs.networks)]
+        template_beam = _find_rest(template.fits.network, template, elements, places)
+        beams = [
+            _find_rest(net, design_of(designs, d), elements, places) for d, (net, _) in enumerate(designs.networks)
+        ]
         return _BeamAtRest(
             template_beam.place,
             dual_of_steps(template_beam.angle, [beam.angle for beam in beams]),
@@ -185,12 +187,12 @@ def _rest_of_designs(
         )
     steps: Any = np.array([[net.beams[name].section.thickness for name in names] for net, _ in designs.networks])
     first: Any = np.array([template.fits.network.beams[name].section.thickness for name in names])
-    return _plain_rest(mesh, elements, places, dual_of_steps(first[:, None], steps[..., None]))
+    return _unloaded_plain(mesh, elements, places, dual_of_steps(first[:, None], steps[..., None]))
 
 
-def _plain_rest(mesh: Discretisation, elements: Sequence[int], places: FloatArray, thickness: Any) -> _BeamAtRest:
+def _unloaded_plain(mesh: Discretisation, elements: Sequence[int], places: FloatArray, thickness: Any) -> _BeamAtRest:
     """Return plain beams of a thickness (m, 1): their angle is a polynomial, their speed is even."""
-    cuts, through = mesh.elements.cuts[elements], _matrices(mesh.degree, tuple(places.tolist())).interpolation
+    cuts, through = mesh.elements.cuts[elements], _matrices_at(mesh.degree, tuple(places.tolist())).interpolation
     place = cuts[:, :1] + (cuts[:, 1:] - cuts[:, :1]) * places
     return _BeamAtRest(place, mesh.elements.angle[elements] @ through.T, thickness + 0.0 * places)
 
@@ -223,7 +225,7 @@ def _forces(at: Equilibria, elements: list[int], places: FloatArray, rest: _Beam
     e = whole._replace(**picked, length=whole.length[..., elements], laid=laid)
     load = energy.line_load(mesh, at.drive)[..., elements, :]
     rotation, end = unknowns[..., energy.rotation_columns(mesh.degree)], unknowns[..., -2:]
-    speed, reached = e.weight / rule.weights, _matrices(mesh.degree, tuple(places.tolist()))
+    speed, reached = e.weight / rule.weights, _matrices_at(mesh.degree, tuple(places.tolist()))
     upto = reached.integrals.T
     h, v = (end[..., axis, None] + load[..., axis, None] * e.ahead for axis in (0, 1))
     fields = energy.SectionFields(e, e.angle + rotation @ rule.values.T, h, v)
@@ -232,11 +234,11 @@ def _forces(at: Equilibria, elements: list[int], places: FloatArray, rest: _Beam
     moment = -(first @ rule.slopes[:, 0] - turning @ (rule.weights * rule.values[:, 0]))[..., None]
     if e.curl is None:  # rotations from moments, and once more
         inside = integrals_to_points(mesh.degree).T
-        curvature, missed = _curvature(e, rotation, moment + turning @ -inside)
+        curvature, missed = _change_of_curvature(e, rotation, moment + turning @ -inside)
         turn = rotation[..., :1] + missed * rule.places + curvature @ inside
         fields = energy.SectionFields(e, e.angle + turn, h, v)
         turning = fields.turning * speed
-        curvature, missed = _curvature(e, rotation, moment + turning @ -inside)
+        curvature, missed = _change_of_curvature(e, rotation, moment + turning @ -inside)
         turn = rotation[..., :1] + missed * places + curvature @ upto
     else:
         turn = rotation @ reached.values.T
@@ -283,7 +285,7 @@ def _lie_down(
     return states._replace(**merged)
 
 
-def _curvature(e: BeamElements, rotation: Any, moment: Any) -> tuple[Any, Any]:
+def _change_of_curvature(e: BeamElements, rotation: Any, moment: Any) -> tuple[Any, Any]:
     """Return the change of curvature by the parameter at Gauss points (..., q), and what it misses of the turn."""
     rule = basis(rotation.shape[-1] - 1)
     curvature = moment / (e.rigidity * e.weight / rule.weights)
@@ -299,7 +301,7 @@ class _AtFractions(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def _matrices(degree: int, fractions: tuple[float, ...]) -> _AtFractions:
+def _matrices_at(degree: int, fractions: tuple[float, ...]) -> _AtFractions:
     rule, ends = basis(degree), np.array(fractions)
     return _AtFractions(
         shape_functions(degree, ends)[0], integrals(rule.places, ends), interpolation(rule.places, ends)
@@ -346,7 +348,7 @@ def sections(net: Network, beam: str, beam_states: BeamStates) -> BeamSections:
 def sections_of_width(width: Any, beam_states: BeamStates) -> BeamSections:
     """Return section forces and stresses from states of a beam of a width [m], or of widths at all places."""
     at = energy.SectionForces(beam_states.angle + beam_states.turn, beam_states.h, beam_states.v)
-    bending, axial = _stresses(width, beam_states, at)
+    bending, axial = _bending_and_axial(width, beam_states, at)
     return BeamSections(
         beam_states.place + 0.0 * plain(beam_states.moment), beam_states.moment, at.along, at.across, bending, axial
     )
@@ -355,9 +357,9 @@ def sections_of_width(width: Any, beam_states: BeamStates) -> BeamSections:
 def bending_and_axial_stress(width: Any, beam_states: BeamStates) -> tuple[Any, Any]:
     """Return bending stress (signed) and axial stress [Pa] at all places of a beam of a width [m]."""
     at = energy.SectionForces(beam_states.angle + beam_states.turn, beam_states.h, beam_states.v)
-    return _stresses(width, beam_states, at)
+    return _bending_and_axial(width, beam_states, at)
 
 
-def _stresses(width: Any, beam_states: BeamStates, at: energy.SectionForces) -> tuple[Any, Any]:
+def _bending_and_axial(width: Any, beam_states: BeamStates, at: energy.SectionForces) -> tuple[Any, Any]:
     area = width * beam_states.thickness
     return 6 * beam_states.moment / (area * beam_states.thickness), at.along / area

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class BetweenLoads(BetweenPoints):
-    """The same of a path under a load, over the motion of a node that the load goes along with."""
+    """Effort and stress of a path under loads at every place of a node's motion."""
 
     row: FloatArray  # (n + 1,) what the free unknowns and the drive count for in the dimensionless motion
     unit_of_motion: float  # [m or rad]

@@ -231,7 +231,7 @@ class BetweenPoints(ShortRepr):
 
     @cached_property
     def _extremes(self) -> tuple[tuple[SmoothStretch, tuple[Knots, ...]], ...]:
-        """The same of the path and its corners, and extremes between them that may be the largest."""
+        """Of each stretch, and there of each beam, stresses at the points and corners and at extremes between them."""
         corners, numbers = list(self._corners.values()), self._stretch_numbers
         at_points = self.path.beam_stresses(self.axial)[0][:, self._order]
         at_corners = np.empty((0, len(at_points)))
@@ -451,7 +451,7 @@ class BetweenPoints(ShortRepr):
         return corners
 
     def _nearness(self, point: int, width: float) -> float:
-        """Return how near to a point of the path that goes through a bifurcation counts as at it, dimensionless."""
+        """Return the distance from a point of the path within which a bifurcation counts as at it, dimensionless."""
         neighbours = np.flatnonzero(self._stretch == self._stretch[point])
         steps = np.abs(self.own_drive[neighbours] - self.own_drive[point])
         step = float(steps[steps > 0].min(initial=np.inf)) if len(neighbours) > 1 else 0.0

@@ -89,7 +89,7 @@ class AlongTheWay:
 
     @cached_property
     def _known(self) -> dict[bytes, list[FloatArray]]:
-        """Solved places, for every metric asks for the same ones."""
+        """Motions and efforts at solved places, kept because every metric asks for the same places."""
         return {}
 
     def stress(self, ways: FloatArray) -> FloatArray:

@@ -68,7 +68,7 @@ def largest_member_efforts(
         for step in (DIFFERENCE_STEP, -DIFFERENCE_STEP)
     )
     with np.errstate(all="ignore"):
-        efforts = _works(chosen_path, free, drive) / ((motion(ahead) - motion(behind)) / (2 * DIFFERENCE_STEP))
+        efforts = _member_works(chosen_path, free, drive) / ((motion(ahead) - motion(behind)) / (2 * DIFFERENCE_STEP))
     sizes = np.abs(efforts)
     return np.asarray(sizes.max(axis=0, initial=0.0, where=np.isfinite(sizes)))
 
@@ -85,7 +85,7 @@ def _ways(path: EquilibriumPath) -> tuple[FloatArray, FloatArray]:
     return rates / size[:, None], 1.0 / size
 
 
-def _works(path: EquilibriumPath, free: FloatArray, drive: FloatArray) -> FloatArray:
+def _member_works(path: EquilibriumPath, free: FloatArray, drive: FloatArray) -> FloatArray:
     """Return the work done on each beam, then on each spring, for a unit step of the way, (members, points) [J].
 
     The gradient of a member's own energy times the motion of its ends: inside a beam it is in equilibrium.

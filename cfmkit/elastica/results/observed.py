@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 class Observed(Protocol):
-    """Observed values of a path."""
+    """Values that a family observes along a path."""
 
     @property
     def motion(self) -> FloatArray:
@@ -23,7 +23,7 @@ class Observed(Protocol):
 
     @property
     def stress(self) -> FloatArray:
-        """The largest stress at every point [Pa]; NaN likewise."""
+        """The largest stress at every point [Pa]; NaN where the tolerance is not reached."""
 
     @property
     def stresses(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:

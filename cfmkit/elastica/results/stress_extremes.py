@@ -114,7 +114,7 @@ def _find_tops(
         forces, widths = find_forces(slice(k, k + together), fractions)
         arcs = forces.place.reshape(*forces.place.shape[:-1], count, len(fractions))
         arcs = arcs if arcs.ndim == 3 else arcs[None]
-        tops.append(_tops(sections_of_width(widths, forces), arcs, signs, to_series))
+        tops.append(_element_tops(sections_of_width(widths, forces), arcs, signs, to_series))
     return tops
 
 
@@ -123,7 +123,7 @@ def _highest(
 ) -> tuple[Any, Any, Any, Any]:
     """Return the highest stress of each beam [Pa], its place, element and fraction of the element, (b, p, c) each.
 
-    `parts` are what `_tops` returns for all elements, in pieces of the points; of equal stresses the first one counts.
+    `parts` come from `_element_tops` for all elements, in pieces of the points; of equal stresses the first one counts.
     """
     value, place, fraction = (np.concatenate(column, axis=1) for column in zip(*parts, strict=True))
     shape, end = (len(beam_elements), *value.shape[1:]), 0
@@ -138,12 +138,12 @@ def _highest(
     return best, np.clip(arc, 0.0, 1.0), chosen, where
 
 
-def _tops(seen: BeamSections, arcs: Any, signs: FloatArray, to_series: FloatArray) -> tuple[Any, Any, Any]:
+def _element_tops(seen: BeamSections, arcs: Any, signs: FloatArray, to_series: FloatArray) -> tuple[Any, Any, Any]:
     """Return the highest stresses on elements, (m, p, c), from sections at their places, arc lengths (p or 1, m, k)."""
     shape = len(seen.bending_stress), *arcs.shape[1:]
     both = np.array([seen.bending_stress, seen.axial_stress]).reshape(2, *shape)
     series = np.einsum("cs,spmk->mpck", signs, both) @ to_series.T
-    top, x = _top(series)
+    top, x = _series_maximum(series)
     arcs = np.moveaxis(np.broadcast_to(arcs, shape), 0, 1)
     inner = np.einsum("mpck,mpk->mpc", legendre.legvander(x, shape[-1] - 1), arcs @ to_series.T)
     fraction, first, last = (1 + x) / 2, arcs[..., :1], arcs[..., -1:]
@@ -158,7 +158,7 @@ def _polynomials(count: int) -> tuple[Any, Any]:
     return table, np.pad(legendre.legder(np.eye(count)), ((0, 1), (0, 0)))
 
 
-def _top(series: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _series_maximum(series: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the largest values of Legendre series (..., k) on [-1, 1], (...), and where they are."""
     count, grid = series.shape[-1], np.linspace(-1.0, 1.0, N_GRID)
     table, slopes = _polynomials(count)
@@ -193,13 +193,13 @@ def signed_extremes(net: Network, at: Equilibria, beam: str, axial: bool) -> Sid
 
 def largest_stresses(net: Network, at: Equilibria, beams: Sequence[str], axial: bool) -> tuple[FloatArray, FloatArray]:
     """Return the largest stress of each of b beams at every point, (b, p) [Pa], and its place on the arc length."""
-    value, place, _, _ = extremes(net, at, beams, _signs(axial))
+    value, place, _, _ = extremes(net, at, beams, _side_factors(axial))
     best = value.argmax(axis=-1)[..., None]
     return np.take_along_axis(value, best, -1)[..., 0], np.take_along_axis(place, best, -1)[..., 0]
 
 
-def _signs(axial: bool) -> FloatArray:
-    """Return what bending and axial stress count for in the largest of all sides, (c, 2)."""
+def _side_factors(axial: bool) -> FloatArray:
+    """Return the factors of bending and axial stress on the sides of a beam, (c, 2)."""
     both = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)]
     return np.array(both if axial else [(1.0, 0.0), (-1.0, 0.0)])
 
@@ -208,7 +208,7 @@ def largest_stresses_of_designs(
     networks: Sequence[Network], meshes: Sequence[Discretisation], at: Equilibria, row: Any, axial: bool
 ) -> FloatArray:
     """Return the largest stress of each of b beams at points of some designs, (b, p) [Pa]; see `forces_of_designs`."""
-    return np.asarray(extremes_of_designs(networks, meshes, at, row, _signs(axial)).max(axis=-1))
+    return np.asarray(extremes_of_designs(networks, meshes, at, row, _side_factors(axial)).max(axis=-1))
 
 
 def stress_at(

@@ -47,7 +47,7 @@ def bend(network: Network, drive: Drive, buckling: Buckling | None, size: float)
     problem, event, _ = buckling
     mode = np.zeros(problem.mesh.size)
     mode[problem.mesh.free] = problem.orient(event.modes)
-    share = size / _reach(network, problem, mode)
+    share = size / _largest_displacement(network, problem, mode)
     nodes, turns = dict(network.nodes), {}
     for name, node in network.nodes.items():
         (dx, dy), turns[name] = _node_motion(problem, name, share * mode)
@@ -56,22 +56,22 @@ def bend(network: Network, drive: Drive, buckling: Buckling | None, size: float)
     for name, beam in network.beams.items():
         added = tuple(_rotations(problem, name, share * mode).coef.tolist())
         first, last = (
-            _turn(offset, turns[node])
+            _turn_arm(offset, turns[node])
             for offset, node in ((beam.start_offset, beam.start), (beam.end_offset, beam.end))
         )
         beams[name] = replace(beam, shape=Bent(beam.shape, added), start_offset=first, end_offset=last)
     bent = replace(network, nodes=nodes, beams=beams)
-    return bent, f"{size:.6g} m of the buckling mode {_where(drive, buckling)}"
+    return bent, f"{size:.6g} m of the buckling mode {_describe_place(drive, buckling)}"
 
 
-def _where(drive: Drive, buckling: Buckling) -> str:
+def _describe_place(drive: Drive, buckling: Buckling) -> str:
     problem, event, what = buckling
     if what:
         return f"under {100 * event.drive:.4g} % of the {what}"
     place = event.drive * problem.mesh.scales.drive
-    mesh, near = problem.mesh, event.near
-    if near is not None and mesh.rate.any() and abs(place) < NO_DRIVE * float(np.abs(drive.points).max()):
-        residual = energy.gradient(mesh, problem.values(near.x, near.drive), near.drive)
+    mesh, equilibrium = problem.mesh, event.near
+    if equilibrium is not None and mesh.rate.any() and abs(place) < NO_DRIVE * float(np.abs(drive.points).max()):
+        residual = energy.gradient(mesh, problem.values(equilibrium.x, equilibrium.drive), equilibrium.drive)
         force = float(residual @ mesh.rate) * mesh.scales.moment / mesh.scales.drive
         return f"under {abs(force):.4g} {'N' if isinstance(drive, Displacement) else 'N m'}"
     return f"at {place:.6g}"
@@ -99,7 +99,7 @@ def _rotations(problem: NetworkProblem, beam: str, mode: FloatArray) -> Chebyshe
     return Chebyshev.fit(np.concatenate(places), np.concatenate(values), POLYNOMIAL_DEGREE, domain=[0.0, 1.0])
 
 
-def _reach(network: Network, problem: NetworkProblem, mode: FloatArray) -> float:
+def _largest_displacement(network: Network, problem: NetworkProblem, mode: FloatArray) -> float:
     """Return the largest displacement of the unloaded lines in a mode [m]; beams are turned and scaled to fit."""
     largest = 0.0
     for name, beam in network.beams.items():
@@ -123,7 +123,7 @@ def _reach(network: Network, problem: NetworkProblem, mode: FloatArray) -> float
     return largest
 
 
-def _turn(arm: tuple[float, float], angle: float) -> tuple[float, float]:
+def _turn_arm(arm: tuple[float, float], angle: float) -> tuple[float, float]:
     """Return a rigid arm [m] turned by an angle [rad]."""
     turned = complex(*arm) * np.exp(1j * angle)
     return turned.real, turned.imag

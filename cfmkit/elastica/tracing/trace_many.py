@@ -120,7 +120,7 @@ def follow_alike(path: Path, networks: Sequence[Network], control: Control) -> F
 
 
 def _get_common_values(network: Network) -> Any:
-    """Return what is the same in networks that are set up together; None if this one cannot be."""
+    """Return the values that networks which are set up together share; None if this one cannot be."""
     if network.contacts or not all(is_plain(beam) and beam.closure == "rotscale" for beam in network.beams.values()):
         return None
     supports = [node.support for node in network.nodes.values()]

@@ -37,7 +37,7 @@ def pass_fold(walk: Walk, move: ArcMove, fold: Located | None = None, after: int
     where the last of them is passed first. Without a `fold` the step is the first one behind a corner of the path.
     """
     problem, options, begin, sense = walk.problem, walk.options, move.old, walk.sense
-    run, steady, limits, shortest = _run(walk), 0, _limits(walk), SHORTEST_RETRY * move.length
+    run, steady, limits, shortest = _run_of_targets(walk), 0, _drive_limits(walk), SHORTEST_RETRY * move.length
     arc: Iterator[ArcMove] = itertools.chain((move,), follow_arc(problem, move.new, move.tangent, move.length, options))
     while (step := next(arc, None)) is not None:
         passed_fold: Located | None = None
@@ -79,7 +79,7 @@ def pass_fold(walk: Walk, move: ArcMove, fold: Located | None = None, after: int
     return PathStop(WhyStopped.LOST, walk.here.drive, "the path was lost along its arc at {place}")
 
 
-def _run(walk: Walk) -> range:
+def _run_of_targets(walk: Walk) -> range:
     """Return the numbers of the requested values around the next one that go one way."""
     targets, sense = np.insert(walk.targets, 0, 0.0), walk.sense
     first = last = walk.number
@@ -90,12 +90,12 @@ def _run(walk: Walk) -> range:
     return range(first, last + 1)
 
 
-def _limits(walk: Walk) -> tuple[float, float]:
+def _drive_limits(walk: Walk) -> tuple[float, float]:
     beyond = MAX_OVERSHOOT_SHARE * walk.options.span
     return min(0.0, float(walk.targets.min())) - beyond, max(0.0, float(walk.targets.max())) + beyond
 
 
-def _guess(step: ArcMove, fold: Located | None, side: int, goal: float) -> FloatArray:
+def _guess_near_fold(step: ArcMove, fold: Located | None, side: int, goal: float) -> FloatArray:
     """Return the unknowns at a drive within a step, before (0) or behind (1) a fold, where they go like a root."""
     if fold is None:
         return step.interpolate(goal)
@@ -112,7 +112,7 @@ def _pass_values(walk: Walk, run: range, step: ArcMove, fold: Located | None) ->
         inside = np.flatnonzero(((targets - low) * (targets - high) <= 0) & (targets != low))
         inside = inside[np.abs(targets[inside] - low).argsort(kind="stable")]
         for number, goal in zip((run.start + inside).tolist(), targets[inside].tolist(), strict=True):
-            guess = _guess(step, fold, side, goal)
+            guess = _guess_near_fold(step, fold, side, goal)
             at = correct(walk.problem, guess, goal)
             if at is not None and largest_motion(walk.problem, at.x - guess) <= room:
                 yield Point(at, number, walk.branch)

@@ -85,7 +85,7 @@ def follow_together(
     options: Options,
     branch: PathBranch | None = None,
 ) -> Iterator[Item | MarchedSteps]:
-    """Yield what `follow` does, but the points of every march together, and no corners that are rounded."""
+    """Yield the items of `follow` with the points of every march in one item, and without rounded corners."""
     at_first = int(len(targets) > 0 and targets[0] == start.drive)
     step, steepest = options.first_step * options.span, max(0.0, abs(start.stiffness))
     walk = Walk(problem, options, targets, start, step, at_first, trail=(start,), branch=branch, steepest=steepest)
@@ -93,7 +93,7 @@ def follow_together(
 
 
 def limit_points(items: Iterable[Any], most: int) -> Iterator[Any]:
-    """Yield the items of a path, at most so many points besides those requested."""
+    """Yield the items of a path, at most `most` points besides those requested."""
     for item in items:
         if isinstance(item, MarchedSteps) and (between := int(np.count_nonzero(item.target < 0))) <= most:
             yield item

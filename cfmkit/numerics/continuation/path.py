@@ -133,7 +133,7 @@ class PathStop:
 
 @dataclass(frozen=True, eq=False)
 class MarchedSteps:
-    """Equilibria that a problem's own k steps came to, by the same rules as `steps.advance`."""
+    """Equilibria of k steps that a problem took by itself, by the rules of `steps.advance`."""
 
     x: FloatArray  # (k, n)
     drive: FloatArray  # (k,)

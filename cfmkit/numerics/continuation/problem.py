@@ -65,7 +65,7 @@ class ContinuationProblem(ScaledUnknowns, Protocol):
         """Return the eigenvalues nearest to zero, nearest first, and their modes, (k,) and (n, k)."""
 
     def orient(self, modes: FloatArray) -> FloatArray:
-        """Return one combination of modes, with the same side whatever spans them."""
+        """Return one vector in the span of modes, on the same side whatever vectors span it."""
 
 
 class PathEquilibrium(NamedTuple):
@@ -97,7 +97,7 @@ class Border(NamedTuple):
     level: float
 
     def find_drive_change(self, x: FloatArray, drive: float, rate: FloatArray) -> float:
-        """Return by how much the drive must change for this, while x does at a rate."""
+        """Return the change of the drive that meets the border's condition while x changes at a rate."""
         row = self.row
         return float((self.level - row[:-1] @ x - row[-1] * drive) / (row[-1] + row[:-1] @ rate))
 

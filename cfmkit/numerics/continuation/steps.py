@@ -131,7 +131,7 @@ def judge(
     guess: FloatArray,
     limits: tuple[float, float],  # largest motion, and largest change of a force, in its unit besides half of it
 ) -> Trial:
-    """Return a step from one equilibrium to another, which is near a guess, with what is to be said of it."""
+    """Return a step between two equilibria as a trial: accepted or not, with what its guess missed."""
     if new is None:
         return Trial(None)
     moved, missed = (largest_motion(problem, new.x - reference) for reference in (start.x, guess))
