@@ -45,11 +45,11 @@ class Verbs(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all verbs, in the order of the help."""
-        return sorted(names(), key=lambda name: _import_verb(name).HELP_POSITION)
+        return sorted(names(), key=lambda name: _module(name).HELP_POSITION)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return one verb as a command, None if there is no such verb."""
-        return _make_command(cmd_name) if cmd_name in names() else None
+        return _command(cmd_name) if cmd_name in names() else None
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Find the verb that the arguments begin with."""
@@ -65,13 +65,13 @@ def _describe_unknown(name: str) -> str:
     return f"there is no command {name!r}; {hint}"
 
 
-def _import_verb(name: str) -> ModuleType:
+def _module(name: str) -> ModuleType:
     return import_module(f"{verbs.__name__}.{name.replace('-', '_')}")
 
 
-def _make_command(name: str) -> Any:
+def _command(name: str) -> Any:
     """Return the command of a verb: its options are the fields of what its `run` takes."""
-    module = _import_verb(name)
+    module = _module(name)
     options = vars(module)[module.run.__annotations__["options"]]
 
     def callback(**values: Any) -> Call:

@@ -33,16 +33,16 @@ def materials_page_parts() -> tuple[str, str, tuple[Section, ...], dict[str, lis
     columns = (
         field("name", "material", wraps=True),
         Field("E\n[GPa]", lambda item: f"{item['youngs_modulus'] / 1e9:.4g}"),
-        Field("from ... to", lambda item: _format_range(item["scatter"]["youngs_modulus"], 1e9), wraps=True),
-        Field("yield_strength\n[MPa]", lambda item: _format_in_unit(item["yield_strength"], 1e6)),
-        Field("from ... to", lambda item: _format_range(item["scatter"]["yield_strength"], 1e6), wraps=True),
+        Field("from ... to", lambda item: _range(item["scatter"]["youngs_modulus"], 1e9), wraps=True),
+        Field("yield_strength\n[MPa]", lambda item: _number(item["yield_strength"], 1e6)),
+        Field("from ... to", lambda item: _range(item["scatter"]["yield_strength"], 1e6), wraps=True),
     )
     sources = (
         field("name", "material", wraps=True),
         Field("nu", lambda item: "" if item["poisson_is_assumed"] else f"{item['poisson_ratio']:.4g}"),
-        Field("from ... to", lambda item: _format_spread(item["scatter"]["poisson_ratio"]), wraps=True),
+        Field("from ... to", lambda item: _spread(item["scatter"]["poisson_ratio"]), wraps=True),
         Field("density\n[kg/m^3]", lambda item: f"{item['density']:.4g}"),
-        Field("from ... to", lambda item: _format_spread(item["scatter"]["density"]), wraps=True),
+        Field("from ... to", lambda item: _spread(item["scatter"]["density"]), wraps=True),
         field("source", wraps=True),
     )
     lasting = [
@@ -94,30 +94,28 @@ def properties(item: Mapping[str, Any]) -> str:
     from cfmkit.stock.materials import ASSUMED_DATA
 
     scatter, strength = item["scatter"], item["yield_strength"]
-    spread = _format_spread(scatter["poisson_ratio"])
+    spread = _spread(scatter["poisson_ratio"])
     reported = [
-        f"E = {item['youngs_modulus'] / 1e9:.4g} GPa ({_format_range(scatter['youngs_modulus'], 1e9)})",
+        f"E = {item['youngs_modulus'] / 1e9:.4g} GPa ({_range(scatter['youngs_modulus'], 1e9)})",
         f"nu = {item['poisson_ratio']:.4g} ({'assumed' if item['poisson_is_assumed'] else spread})",
-        f"density {item['density']:.4g} kg/m^3 ({_format_spread(scatter['density'])})",
+        f"density {item['density']:.4g} kg/m^3 ({_spread(scatter['density'])})",
     ]
     if strength is not None:
-        reported.insert(
-            1, f"yield_strength = {strength / 1e6:.4g} MPa ({_format_range(scatter['yield_strength'], 1e6)})"
-        )
+        reported.insert(1, f"yield_strength = {strength / 1e6:.4g} MPa ({_range(scatter['yield_strength'], 1e6)})")
     if item["name"] in ASSUMED_DATA:
         rows = assumed_rows(item["name"], ASSUMED_DATA[item["name"]])
         reported += [f"assumed {row['property']}: {row['values']} ({row['source']})" for row in rows]
     return ", ".join(reported)
 
 
-def _format_in_unit(value: float | None, size: float) -> str:
+def _number(value: float | None, size: float) -> str:
     return "" if value is None else f"{value / size:.4g}"
 
 
-def _format_range(ends: Iterable[float] | None, size: float) -> str:
+def _range(ends: Iterable[float] | None, size: float) -> str:
     return "" if ends is None else " ... ".join(f"{end / size:.4g}" for end in ends)
 
 
-def _format_spread(ends: Sequence[float] | None) -> str:
+def _spread(ends: Sequence[float] | None) -> str:
     """Return a range, or that its source states none."""
-    return NO_SPREAD if ends is None else _format_range(ends, 1.0)
+    return NO_SPREAD if ends is None else _range(ends, 1.0)

@@ -75,7 +75,7 @@ class OutlinePiece:
     @classmethod
     def from_contour(cls, contour: Contour) -> OutlinePiece:
         """Return what is within a closed contour."""
-        if _signed_ring_area(contour.edges) > 0:
+        if _encloses(contour.edges) > 0:
             return cls(contour.edges)
         return cls(tuple(edge.reverse() for edge in reversed(contour.edges)))
 
@@ -114,7 +114,7 @@ def merge_pieces(
         rings = [_edges_of_runs(runs, tolerance) for runs in _trace_rings(left, tracks, size)]
     if not rings:
         raise GeometryError("the pieces of the part leave nothing to cut")
-    return tuple(Contour(tuple(ring), layer, closed=True, hole=_signed_ring_area(ring) < 0) for ring in rings)
+    return tuple(Contour(tuple(ring), layer, closed=True, hole=_encloses(ring) < 0) for ring in rings)
 
 
 def _unite(areas: Sequence[FloatArray], size: float, *others: Any) -> Any:
@@ -129,8 +129,8 @@ def _unite(areas: Sequence[FloatArray], size: float, *others: Any) -> Any:
 
 def _ring_area(rings: Sequence[Sequence[Edge]], size: float) -> Any:
     """Return the area that closed chains of edges bound, holes left out, as a geometry of shapely."""
-    outer = [_ring_corners(ring, size) for ring in rings if _signed_ring_area(ring) > 0]
-    inner = [_ring_corners(ring, size) for ring in rings if _signed_ring_area(ring) < 0]
+    outer = [_ring_corners(ring, size) for ring in rings if _encloses(ring) > 0]
+    inner = [_ring_corners(ring, size) for ring in rings if _encloses(ring) < 0]
     whole = _unite(outer, size)
     return whole.difference(_unite(inner, size)) if inner else whole
 
@@ -139,7 +139,7 @@ def _ring_corners(ring: Sequence[Edge], size: float) -> FloatArray:
     return np.concatenate([TracedEdge.from_edge(edge, SAGITTA_RTOL * size).corners[:-1] for edge in ring])
 
 
-def _signed_ring_area(ring: Sequence[Edge]) -> float:
+def _encloses(ring: Sequence[Edge]) -> float:
     """Return the area of a closed chain of edges [m2], negative where it runs clockwise; of smooth ones by points."""
     area = 0.0
     for edge in ring:
@@ -373,7 +373,7 @@ def _round_chains(rings: Sequence[Sequence[Edge]], radius: float, size: float) -
     tolerance = MAX_GRID_DISTANCES * GRID_DISTANCE * size
     touched = (_touch_edges(runs, radius, tolerance) for runs in _trace_rings(reach, ways, size))
     closed = (ring for ring in touched if ring and abs(ring[0].ends[0] - ring[-1].ends[1]) <= tolerance)
-    return [ring for ring in closed if abs(_signed_ring_area(ring)) > (MIN_HOLE_SIDE * size) ** 2]
+    return [ring for ring in closed if abs(_encloses(ring)) > (MIN_HOLE_SIDE * size) ** 2]
 
 
 def _bands(edge: NDArray[np.complex128], beside: NDArray[np.complex128]) -> Iterator[FloatArray]:

@@ -54,7 +54,7 @@ class Moving:
 
 
 def choose_poses(count: int, poses: int = N_FILM_POSES) -> FloatArray:
-    """Return the indices of `poses` evenly spread points of a curve with `count` points, ends included."""
+    """Return which of so many points of a curve are shown as poses: evenly, the ends included."""
     return np.unique(np.linspace(0, count - 1, min(count, poses)).round().astype(int))
 
 

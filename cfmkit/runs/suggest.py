@@ -84,13 +84,13 @@ def as_json(suggestions: Suggestions, block: SuggestBlock) -> dict[str, Any]:
         "suggest": block.model_dump(mode="json", exclude_unset=True, by_alias=True),
         "order": list(block.prefer),
         "proposals": [
-            _proposal_record(suggestions, proposal, number) for number, proposal in enumerate(suggestions.proposals, 1)
+            _record(suggestions, proposal, number) for number, proposal in enumerate(suggestions.proposals, 1)
         ],
         "unjudged": [
-            _proposal_record(suggestions, proposal, number)
+            _record(suggestions, proposal, number)
             for number, proposal in enumerate(suggestions.unjudged, len(suggestions.proposals) + 1)
         ],
-        "near_misses": [_proposal_record(suggestions, proposal) for proposal in suggestions.near],
+        "near_misses": [_record(suggestions, proposal) for proposal in suggestions.near],
         "families": [
             {
                 "family": answer.family,
@@ -126,7 +126,7 @@ def _search_warnings(suggestions: Suggestions) -> Iterator[dict[str, str]]:
         }
 
 
-def _proposal_record(suggestions: Suggestions, proposal: Proposal, number: int | None = None) -> dict[str, Any]:
+def _record(suggestions: Suggestions, proposal: Proposal, number: int | None = None) -> dict[str, Any]:
     about = {"family": proposal.family, "variant": proposal.variant, **numbers_in_border_units(suggestions, proposal)}
     place = {} if number is None else {"folder": folder_name(number, proposal)}
     judged = {

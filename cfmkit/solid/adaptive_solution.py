@@ -145,7 +145,7 @@ class DrivenPart:
         Raises GeometryError if the outline cannot be meshed, or no node is where the part is held.
         """
         meshed = self.part.create_mesh()
-        coarse = meshed.follow_densely(
+        coarse = meshed.densely(
             self.stops, lambda share: report(FIRST_SHARE * share, "coarse mesh"), BETWEEN_SHARE * self.error
         )
         if len(coarse.course.poses) < 2:

@@ -271,7 +271,7 @@ class Meshed:
         """Return the poses at some travels, from rest on in one direction [m or rad]; `guide` predicts unknowns."""
         return MeshSolution(self.part, self.problem, follow(self.problem, stops, report, guide=guide), self.unjudged)
 
-    def follow_densely(self, stops: Sequence[float], report: Callable[[float], None], allowed: float) -> MeshSolution:
+    def densely(self, stops: Sequence[float], report: Callable[[float], None], allowed: float) -> MeshSolution:
         """Return the path with as many poses between the stops as the curve needs, and its error between poses."""
         course, off = refine_path(self.problem, follow(self.problem, stops, report), allowed)
         return MeshSolution(self.part, self.problem, course, self.unjudged, off)

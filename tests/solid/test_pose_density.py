@@ -65,7 +65,7 @@ def test_what_is_reported_is_what_many_poses_find(leaf, many):
 
 def test_added_poses_are_equilibria_in_order_of_travel_and_keep_the_requested_ones(leaf):
     stops = [0.0, 0.003, 0.006, 0.009]
-    dense = leaf.follow_densely(stops, lambda _share: None, MAX_EFFORT_ERROR)
+    dense = leaf.densely(stops, lambda _share: None, MAX_EFFORT_ERROR)
     travel = dense.course.travel
     assert dense.between <= MAX_EFFORT_ERROR
     assert (np.diff(travel) > 0).all()
@@ -79,4 +79,4 @@ def test_added_poses_are_equilibria_in_order_of_travel_and_keep_the_requested_on
 
 
 def test_a_curve_of_two_poses_has_no_measured_error(leaf):
-    assert np.isnan(leaf.follow_densely([0.0, 0.0001], lambda _share: None, MAX_EFFORT_ERROR).between)
+    assert np.isnan(leaf.densely([0.0, 0.0001], lambda _share: None, MAX_EFFORT_ERROR).between)

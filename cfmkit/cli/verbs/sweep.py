@@ -69,7 +69,7 @@ def run(options: SweepOptions, terminal: Terminal) -> Document:
         dimensions = {metric.name: metric.dimension for metric in work.study.metrics}
         page = study_documents.sweep_document(spec, reported, dimensions, code, reused=records.reused)
         varied = [item.path for item in work.plan.variables]
-        study.write_pages(page, work.study, varied, tables, partial(_picture_makers, records, summary))
+        study.write_pages(page, work.study, varied, tables, partial(_pictures, records, summary))
         finished = study.commit(page, work.study, options.seed, [records], reported)
     return replace(finished, complaints=(*_sweep_complaints(records, code, options, document), *finished.complaints))
 
@@ -139,7 +139,7 @@ def _first_refusal(records: Records, document: YamlDocument) -> tuple[str, ...]:
     return (f"error    {reported}",)
 
 
-def _picture_makers(records: Records, summary: Summary) -> dict[str, Any]:
+def _pictures(records: Records, summary: Summary) -> dict[str, Any]:
     from cfmkit.studies.pictures import makers  # imports matplotlib, which takes half a second
 
     return makers(records, summary)

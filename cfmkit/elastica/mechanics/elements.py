@@ -88,8 +88,8 @@ def plain_tables(
     """Return the tables of elements of plain beams of d networks, (d, e, q) each; of one by compiled code."""
     if len(length) == 1 and coefficients.dtype == rigidities.dtype == float and (compiled := load_compiled()):
         table, lengths = np.empty((6, 1, len(row), degree + N_EXTRA_POINTS)), np.empty((1, len(row)))
-        inputs = (np.ascontiguousarray(values, float) for values in (cuts, coefficients, length, rigidities))
-        compiled.tables(shape_row(degree)[0], row, *inputs, table, lengths, scales.length, scales.force)
+        given = (np.ascontiguousarray(values, float) for values in (cuts, coefficients, length, rigidities))
+        compiled.tables(shape_row(degree)[0], row, *given, table, lengths, scales.length, scales.force)
         return {**dict(zip(TABLES_AT_POINTS, table, strict=True)), "length": lengths}
     rule, force, width = basis(degree), scales.force, cuts[:, 1:] - cuts[:, :1]
     t, c, angle = cuts[:, :1] + width * rule.places, coefficients[..., row, :], 0.0

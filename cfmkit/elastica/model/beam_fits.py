@@ -162,8 +162,8 @@ def chords(coefficients: Any) -> tuple[Any, Any]:
 def rigidities_of(beams: Sequence[Beam]) -> Any:
     """Return bending rigidities and the compliances of stretching and shearing of plain beams, (3, b)."""
     sections = [beam.section for beam in beams]
-    rigidities = {key: _rigidities(section) for key, section in {id(section): section for section in sections}.items()}
-    return np.array([rigidities[id(section)] for section in sections]).T
+    known = {key: _rigidities(section) for key, section in {id(each): each for each in sections}.items()}
+    return np.array([known[id(section)] for section in sections]).T
 
 
 def _rigidities(s: Section) -> tuple[Any, Any, Any]:

@@ -212,7 +212,7 @@ def _pull_back(spec: VcfmSpec, pushed: AdaptiveSolution, end: float, report: Cal
     """Return a part that is pulled back to a travel [m], on the mesh found for pushing, with a quarter of the poses."""
     from cfmkit.solid.adaptive_solution import BETWEEN_SHARE
 
-    return _path(pushed.meshed.follow_densely(_stops(spec, end, 4), report, BETWEEN_SHARE * pushed.error.target))
+    return _path(pushed.meshed.densely(_stops(spec, end, 4), report, BETWEEN_SHARE * pushed.error.target))
 
 
 def _path(solved: MeshSolution) -> SolidPath:

@@ -25,7 +25,7 @@ def dump(
     complete: bool = False,  # write every default too, not only what was set
 ) -> str:
     """Return a specification as YAML that `read_document` and `bind` turn into an equal one; keys as in the model."""
-    content = _to_json(spec, spec.model_dump(mode="json"), (), complete)
+    content = _content(spec, spec.model_dump(mode="json"), (), complete)
     # Lists of blocks, such as the requirements, read best at the end.
     ordered = dict(sorted(content.items(), key=lambda item: _holds_blocks(item[1])))
     return "".join(f"{line}\n" for line in _block_lines(ordered, 0))
@@ -35,7 +35,7 @@ def _holds_blocks(value: Any) -> bool:
     return isinstance(value, list) and any(isinstance(item, dict) for item in value)
 
 
-def _to_json(value: Any, text: Any, allowed: tuple[Slot, ...], complete: bool) -> Any:
+def _content(value: Any, text: Any, allowed: tuple[Slot, ...], complete: bool) -> Any:
     """Return the JSON form of a value without what its reader knows anyway.
 
     Value and JSON form are walked side by side: one says what was set, the other how it is written.
@@ -46,12 +46,12 @@ def _to_json(value: Any, text: Any, allowed: tuple[Slot, ...], complete: bool) -
         names = [
             name for name in type(value).model_fields if name in text and _is_written(value, name, must_tell, complete)
         ]
-        return {name: _to_json(getattr(value, name), text[name], own_slot.child(name), complete) for name in names}
+        return {name: _content(getattr(value, name), text[name], own_slot.child(name), complete) for name in names}
     if isinstance(value, Mapping) and isinstance(text, dict):
-        return {key: _to_json(value.get(key), item, _slots_below(allowed, key), complete) for key, item in text.items()}
+        return {key: _content(value.get(key), item, _slots_below(allowed, key), complete) for key, item in text.items()}
     if isinstance(value, tuple | list) and isinstance(text, list) and len(value) == len(text):
         pairs = enumerate(zip(value, text, strict=True))
-        return [_to_json(*pair, _slots_below(allowed, index), complete) for index, pair in pairs]
+        return [_content(*pair, _slots_below(allowed, index), complete) for index, pair in pairs]
     return text
 
 
