@@ -1,4 +1,4 @@
-"""Values of a finished design: rounded within bounds, at a bound or not, ranges about them, metrics that it has."""
+"""Values of a finished design: rounded within bounds, at a bound or not, ranges about them, metrics as analysed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Geometry of a mechanism in poses, as named bodies that are held, driven, free or in contact; views of their area.
+"""Geometry of a mechanism in poses, as named bodies held, driven, free or in contact: outline, box, swept area.
 
 A family returns these bodies once (`families/NAME/part.py`). Views are written once for all families, also pictures,
 animations and the frame around what moves.

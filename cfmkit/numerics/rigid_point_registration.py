@@ -1,4 +1,4 @@
-"""Robust registration of measured points to smooth curves by one rigid motion, perhaps with a width; gaps of points.
+"""Registration of measured points to smooth curves by one rigid motion, robust against outliers; distances from them.
 
 Iterative closest point: each point finds its foot on its curve by Newton's method, then a weighted point-to-line
 Gauss-Newton step moves all points at once by an angle and a shift. Weights are Tukey's biweight of the normal

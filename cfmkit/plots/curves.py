@@ -1,4 +1,4 @@
-"""Diagrams of force over displacement or torque over angle; the main figure of a result; several models with gaps.
+"""Diagrams of force over displacement or torque over angle; the main figure of a result; several models compared.
 
 Branches are drawn in the order of their path: a curve that folds back shows every force at one displacement, gaps stay
 gaps, and what is unstable is dashed. Names stand beside their lines; where the specification bounds the force, the band

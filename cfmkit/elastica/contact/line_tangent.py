@@ -1,4 +1,4 @@
-"""Tangent of the middle line of beams that shear or stretch: it has kinks at contacts, which gaps are freed from.
+"""Tangent of the middle line of beams that shear or stretch, with kinks at contacts; gaps without these kinks.
 
 The line of a beam that shears has a kink under a force f along a normal n: F jumps by f n, and with it the slope x' of
 the line. The place S of the contact is where P - f g is stationary. With dP/dS = [F . x' + M theta' - W], whose jump is

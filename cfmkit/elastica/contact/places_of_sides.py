@@ -1,4 +1,4 @@
-"""Places at which sides of beams touch: new, remaining, taken over by a pad, or spread to a length that lies there."""
+"""Places at which sides of beams touch: new, remaining, with a pad instead, or spread to a length on an obstacle."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A stretch followed by the arc length, where steps by the drive fail or behind a limit point, until it leads again."""
+"""A stretch of a path followed by the arc length, from where steps by the drive fail to where it leads again."""
 
 from __future__ import annotations
 
