@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
@@ -26,9 +27,10 @@ from cfmkit.stock.material_and_part_spec import MaterialSpec
 from cfmkit.stock.processes import MIN_METAL_MODULUS, PROCESSES_BY_NAME
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from cfmkit.arrays import FloatArray
+    from cfmkit.curves import Curve
     from cfmkit.families.request_spec import Springs, SuggestBlock
     from cfmkit.results import Result
     from cfmkit.specs.spec import Spec
@@ -201,6 +203,14 @@ class FamilyOffer:
     reason: str = ""  # why there are none
 
 
+def take_turns(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Return candidates of all variants by turns, the most promising of each first; variants keep their order."""
+    rows: dict[str, list[Candidate]] = {candidate.variant: [] for candidate in candidates}
+    for candidate in sorted(candidates, key=lambda candidate: candidate.promise):
+        rows[candidate.variant].append(candidate)
+    return [candidate for turn in zip_longest(*rows.values()) for candidate in turn if candidate is not None]
+
+
 N_WINDOWS = 400  # windows that are compared, evenly over the curve
 WINDOW_EXTENSION_SHARE = 1e-6
 """A window is made longer by this share of its length: to write it down must not make it shorter."""
@@ -227,6 +237,13 @@ def flattest(result: Result, length: float) -> tuple[float, float] | None:
         worst = np.maximum(worst, ripples(part.motion[order], part.effort[order], starts, length))
     best = int(np.argmin(worst))
     return (float(starts[best]), float(starts[best]) + length) if np.isfinite(worst[best]) else None
+
+
+def mean_and_stress(curve: Curve, window: tuple[float, float]) -> tuple[float, float]:
+    """Return the mean effort in a window [N or N m], and the largest stress up to its end [Pa]."""
+    mean = float(np.interp(np.linspace(*window, 101), curve.motion, curve.effort).mean())
+    stress = np.maximum.accumulate(curve.extra["max_stress"].values)
+    return mean, float(np.interp(window[1], curve.motion, stress))
 
 
 def ripples(places: FloatArray, effort: FloatArray, starts: FloatArray, length: float) -> FloatArray:

@@ -230,7 +230,7 @@ def _left_out(spec: Spec, sample: Curve | None) -> frozenset[str]:
     stressed = sample is None or "max_stress" in sample.extra
     lasting = getattr(spec, "durability", None)
     lives = () if lasting is not None and lasting.fatigue is not None else NEED_FATIGUE
-    followed = () if getattr(spec, "target_curve", None) is not None else NEED_CURVE
+    followed = () if spec.target_curve is not None else NEED_CURVE
     by_name = (STATIC_BALANCE, *ENVELOPE_METRICS)
     return frozenset((*followed, *(() if stressed else NEED_STRESS), *lives, *NEED_TIME, *by_name))
 

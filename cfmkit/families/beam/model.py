@@ -428,7 +428,7 @@ def _may_go_straight_on(spec: BeamSpec) -> bool:
     analysis, by_motion = spec.analysis, spec.mechanism.drive.by_motion
     if spec.mechanism.has_contacts:
         return False
-    plain = analysis.surface is None and getattr(spec, "target_curve", None) is None and not analysis.through_folds
+    plain = analysis.surface is None and spec.target_curve is None and not analysis.through_folds
     return plain and by_motion and spec.fidelity != "solid" and spec.extent > 0 and not analysis.imperfection
 
 

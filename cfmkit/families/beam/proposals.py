@@ -33,8 +33,10 @@ from cfmkit.families.proposals import (
     aim_below_stiffening,
     flattest,
     is_too_wide,
+    mean_and_stress,
     name_variant,
     ripples,
+    take_turns,
 )
 from cfmkit.families.run_control import Run
 from cfmkit.specs.units import Place
@@ -134,18 +136,9 @@ def propose(request: Request, run: Run) -> FamilyOffer:
                 elif not candidates or candidate.spec != candidates[-1].spec:
                     candidates.append(candidate)
     if candidates:
-        return FamilyOffer(tuple(_vary_by_turns(candidates)[:MAX_PROPOSALS]))
+        candidates.sort(key=lambda candidate: candidate.promise)  # the shape of the most promising one first
+        return FamilyOffer(tuple(take_turns(candidates)[:MAX_PROPOSALS]))
     return FamilyOffer(reason=min(missed, key=lambda miss: miss[0])[1])
-
-
-def _vary_by_turns(candidates: list[Candidate]) -> list[Candidate]:
-    """Return candidates of all shapes by turns, that of the most promising one first."""
-    kinds = list(dict.fromkeys(candidate.variant for candidate in candidates))
-    ordered = sorted(candidates, key=lambda candidate: candidate.promise)
-    rows = [[candidate for candidate in ordered if candidate.variant == kind] for kind in kinds]
-    rows.sort(key=lambda row: row[0].promise)
-    longest = max(map(len, rows))
-    return [row[k] for k in range(longest) for row in rows if k < len(row)]
 
 
 def _rescale_shape(
@@ -271,10 +264,9 @@ def _refit(spec: BeamSpec, request: Request, model: Callable[[BeamSpec, Run], Re
     window = flattest(result, request.travel)
     if window is None:
         return None, 1.0
-    curve, allowed = result.curve, request.strength_used * (spec.mechanism.material.allowable(1.0) or np.inf)
-    mean = float(np.interp(np.linspace(*window, 101), curve.motion, curve.effort).mean())
-    stress = np.maximum.accumulate(curve.extra["max_stress"].values)
-    thinner = min(1.0, 0.99 * allowed / float(np.interp(window[1], curve.motion, stress)))
+    allowed = request.strength_used * (spec.mechanism.material.allowable(1.0) or np.inf)
+    mean, stress = mean_and_stress(result.curve, window)
+    thinner = min(1.0, 0.99 * allowed / stress)
     thickness = float(spec.mechanism.thickness) * thinner  # type: ignore[arg-type]
     changes = {
         "mechanism.thickness": thickness,

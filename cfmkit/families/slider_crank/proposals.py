@@ -10,13 +10,20 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cfmkit.families.findings import mm
-from cfmkit.families.proposals import Candidate, FamilyOffer, aim_below_stiffening, flattest, name_variant
+from cfmkit.families.proposals import (
+    Candidate,
+    FamilyOffer,
+    aim_below_stiffening,
+    flattest,
+    mean_and_stress,
+    name_variant,
+    take_turns,
+)
 from cfmkit.families.slider_crank.catalogue_spring_proposals import with_catalogue_springs
 from cfmkit.families.slider_crank.printed.outline import drawing
 from cfmkit.families.slider_crank.printed.part import PAD_SIZE
@@ -317,12 +324,8 @@ class PrintedSize:
 
 def _vary_by_turns(candidates: list[Candidate]) -> list[Candidate]:
     """Return as many candidates as are offered, of different kinds by turns; what takes long to design comes last."""
-    kinds = list(dict.fromkeys(candidate.variant for candidate in candidates))
-    first = sorted(candidates, key=lambda candidate: candidate.promise)
-    rows = [[candidate for candidate in first if candidate.variant == kind] for kind in kinds]
-    by_turns = [candidate for turn in zip_longest(*rows) for candidate in turn if candidate is not None]
     # cut before what takes long goes to the end, or none of that would be left
-    return sorted(by_turns[:MAX_PROPOSALS], key=lambda candidate: candidate.promise >= SLOW_PROMISE)
+    return sorted(take_turns(candidates)[:MAX_PROPOSALS], key=lambda candidate: candidate.promise >= SLOW_PROMISE)
 
 
 def _materials(request: Request) -> list[dict[str, Any]]:
@@ -355,10 +358,9 @@ def correct(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
     flat_window, material = flattest(result, request.travel), solid.mechanism.material
     if flat_window is None or material is None:
         return solid
-    curve, allowed = result.curve, request.strength_used * (material.allowable(1.0) or np.inf)
-    mean = float(np.interp(np.linspace(*flat_window, 101), curve.motion, curve.effort).mean())
-    stress = np.maximum.accumulate(curve.extra["max_stress"].values)
-    thinner = min(1.0, 0.99 * allowed / float(np.interp(flat_window[1], curve.motion, stress)))
+    allowed = request.strength_used * (material.allowable(1.0) or np.inf)
+    mean, stress = mean_and_stress(result.curve, flat_window)
+    thinner = min(1.0, 0.99 * allowed / stress)
     window = tuple(Place(place, "length") for place in flat_window)
     changes: dict[str, Any] = {"analysis.travel": (0.0, flat_window[1]), "analysis.window": window}
     return solid.replace(changes | _scale_sections(solid, thinner, request.target / (mean * thinner**3)))
