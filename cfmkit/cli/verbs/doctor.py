@@ -194,7 +194,7 @@ def _describe_engine(solver: Mapping[str, Any]) -> str:
         return "runs on compiled C"
     installed = "it was installed without a C compiler, or for another version"
     why = "CFMKIT_WITHOUT_C is set" if solver["switched_off"] else installed
-    return f"runs on numpy, about 30 times slower: {why}"
+    return f"runs on numpy, 25 to 100 times slower: {why}"
 
 
 def _version_or_missing(package: Mapping[str, Any]) -> str:
