@@ -94,8 +94,12 @@ class Solution(ShortRepr):
         cam = self.assembly.profile
         if not isinstance(self.assembly.track, TrackRows):
             return np.array([[read(cam)]])
-        parts = [row_of((cam.path.law, cam.roller_radius, cam.end), row) for row in range(self.count)]
-        return np.array([[read(CamProfile(RollerPath(law, end), radius, end))] for law, radius, end in parts])
+        numbers = *cam.path.law.numbers, cam.roller_radius, cam.end
+        table = np.stack([self.column(number) for number in numbers], axis=1)
+        _, first, which = np.unique(table, axis=0, return_index=True, return_inverse=True)
+        parts = (row_of((cam.path.law, cam.roller_radius, cam.end), row) for row in first.tolist())
+        values = [read(CamProfile(RollerPath(law, end), radius, end)) for law, radius, end in parts]
+        return np.array(values)[which.ravel(), None]
 
     @cached_property
     def displacement(self) -> FloatArray:
