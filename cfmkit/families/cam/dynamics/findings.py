@@ -32,16 +32,7 @@ INVERSE_OPTION = "analysis.dynamics.method=inverse"  # as ``--set`` takes it
 
 def findings_of(moved: MotionSolution) -> tuple[Finding, ...]:
     """Return every finding about a motion, the gravest first."""
-    checks = (
-        _overpressure,
-        _slack_cable,
-        _jams,
-        _corner_contact,
-        _spring_limits,
-        _odd_inertias,
-        _no_friction,
-        _no_weight,
-    )
+    checks = (_overpressure, _slack_cable, _jams, _corner, _spring_limits, _odd_inertias, _no_friction, _no_weight)
     return tuple(warning for check in checks for warning in check(moved))
 
 
@@ -102,7 +93,7 @@ def _jams(moved: MotionSolution) -> Iterator[Finding]:
         )
 
 
-def _corner_contact(moved: MotionSolution) -> Iterator[Finding]:
+def _corner(moved: MotionSolution) -> Iterator[Finding]:
     corner = moved.history.on_corner
     if corner.any():
         yield finding("undercut", f"a roller pivots on the corner of its cam {_span_text(moved, corner)}")
