@@ -35,7 +35,7 @@ MAX_HALVINGS = 60  # of an interval between two poses: beyond them a travel has 
 
 
 class LoadEnd(enum.Enum):
-    """How far a path goes under a load."""
+    """Extent of a path under a load."""
 
     REACHED = "the load is reached"
     MAXIMUM = "the load has a maximum before: the part jumps there"

@@ -91,7 +91,7 @@ class Setup:
 
     @property
     def sampling(self) -> str:
-        """How samples are drawn: one of `SAMPLE_KINDS`, ``random``, or nothing of a method with points of its own."""
+        """Way to draw samples: one of `SAMPLE_KINDS`, ``random``, or nothing of a method with points of its own."""
         return self.block.sampling or METHOD_NAMES[self.block.method].sampling
 
     @property
