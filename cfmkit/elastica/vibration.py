@@ -142,7 +142,7 @@ def _check_arguments(path: EquilibriumPath, masses: NetworkMasses, count: int) -
         if name not in path.network.nodes:
             raise InputError(f"a mass is given for {name!r}, which is not a node")
     elements, degree = len(path.mesh.elements.length), _degree_of_rotations(path.mesh, count)
-    size = path.mesh.size + elements * (degree - path.mesh.degree + 4 * _order_of_inner_forces(path.mesh, degree))
+    size = path.mesh.size + elements * (degree - path.mesh.degree + 4 * _degree_of_inner_forces(path.mesh, degree))
     if size > MAX_UNKNOWNS:
         raise InputError(
             f"natural frequencies need {size} unknowns, more than {MAX_UNKNOWNS}: the beams have too many windings "
@@ -156,8 +156,8 @@ def _degree_of_rotations(mesh: Discretisation, count: int) -> int:
     return max(mesh.degree, min(MAX_DEGREE, max(wanted, mesh.degree + DEGREES_BESIDE_STATICS)))
 
 
-def _order_of_inner_forces(mesh: Discretisation, degree: int) -> int:
-    """Return the order of forces and, by one more, positions: as smooth as sines of the rotation."""
+def _degree_of_inner_forces(mesh: Discretisation, degree: int) -> int:
+    """Return the degree of inner forces: one below that of rotations, in long chains at most `ORDER_IN_CHAIN`."""
     return degree - 1 if _elements_a_beam(mesh) < LONG_CHAIN else min(degree - 1, ORDER_IN_CHAIN)
 
 
@@ -178,7 +178,7 @@ class _VibratingNetwork:
 
     def __init__(self, path: EquilibriumPath, fine: Discretisation, masses: NetworkMasses) -> None:
         self.network, self.fine, self.masses = path.network, fine, masses
-        self.order = _order_of_inner_forces(fine, fine.degree)
+        self.order = _degree_of_inner_forces(fine, fine.degree)
         rule = basis(fine.degree)
         self.rule = rule
         self.bubbles = shape_functions(self.order + 1, rule.places)[0][:, 2:]

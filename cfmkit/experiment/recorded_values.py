@@ -234,7 +234,7 @@ def loop_area(
 def turned_loop(
     curves: Sequence[Curve],  # one a cycle; a cycle without a way back says nothing
 ) -> bool:
-    """Return whether the loops run the wrong way round, by more than rounding of the forces explains."""
+    """Return whether the loops, summed, run the wrong way round by `REVERSED_LOOP_SHARE` of mean force times travel."""
     areas, sizes = [], []
     for curve in curves:
         if len(curve.branches) < 2:

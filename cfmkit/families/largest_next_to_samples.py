@@ -1,4 +1,4 @@
-"""The largest values of curves, and of what lies next to their samples: of one mechanism, or of many as rows."""
+"""Largest values of sampled curves, also between the samples: of one mechanism, or of many, one in each row."""
 
 from __future__ import annotations
 

@@ -113,10 +113,11 @@ class Request:
         return self.envelope[2] if len(self.envelope) > 2 else None
 
     @property
-    def strength_used(self) -> float:
-        """The share of the strength that designs may use: made parts are thicker and stiffer than drawn.
+    def strength_share(self) -> float:
+        """Stress that designs may have, in parts of the strength: the reserve over the safety factor.
 
-        Up to an end stop the stress rises at most about as the motion does.
+        Less where a yield is required, as made parts are thicker and stiffer than drawn, and where an end stop follows,
+        up to which the stress rises at most about as the motion does.
         """
         up_to_stop = 1.0 if self.stated.overload is None else 1.0 + STOP_MARGIN_SHARE
         return self.reserve * (1.0 if self.stated.min_yield is None else STRENGTH_SHARE) / (self.safety * up_to_stop)

@@ -1,6 +1,6 @@
-"""Variants of a specification as rows: those that a family solves together, and each of the others by itself.
+"""Variants of a specification, solved together where the family can, else one by one; studies read both alike.
 
-Studies read rows, whichever way a mechanism is solved.
+A row is the solution of one variant at one preload or branch.
 """
 
 from __future__ import annotations

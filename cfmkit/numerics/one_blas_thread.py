@@ -1,4 +1,4 @@
-"""Dense matrices of a few hundred rows on one thread of the linear algebra library.
+"""BLAS on one thread: while a function runs (a decorator), or in a whole process (environment variables).
 
 BLAS libraries start as many threads as there are cores, which wait for each other busily: frequencies of a network of
 beams took 14 s of time and 28 s of processor time in Python, and 1.9 s with one thread. Commands ask for one thread by

@@ -125,7 +125,7 @@ def _parabola(places: FloatArray, values: FloatArray) -> tuple[FloatArray, Float
 
 
 def _vertices(t: FloatArray, f: FloatArray, otherwise: FloatArray) -> FloatArray:
-    """Return where the parabolas through three samples (n, 3) each are highest, `otherwise` where they have no top."""
+    """Return where the parabolas through three samples (n, 3) each are highest; `otherwise` if not between them."""
     first = (f[:, 1] - f[:, 0]) / (t[:, 1] - t[:, 0])
     second = (f[:, 2] - f[:, 1]) / (t[:, 2] - t[:, 1])
     bend = (second - first) / (t[:, 2] - t[:, 0])

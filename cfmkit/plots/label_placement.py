@@ -98,7 +98,7 @@ def _place_label(ground: _Ground, label: Label, size: float, others: list[FloatA
     text.set_position(tuple(center / ground.extent))
     text.set_zorder(6)
     if label.halo:
-        _clear_ground(ground, center, box)
+        _fade_background(ground, center, box)
     gap = np.hypot(*np.maximum(np.abs(points - center) - box / 2, 0.0).T)
     anchor = points[int(np.argmin(gap))]
     if gap.min() > MIN_LEADER_DISTANCE:
@@ -199,8 +199,8 @@ def _nearest_box_points(centers: FloatArray, box: FloatArray, anchors: FloatArra
     return np.asarray(centers + np.clip(anchors - centers, -box / 2, box / 2))
 
 
-def _clear_ground(ground: _Ground, center: FloatArray, box: FloatArray) -> None:
-    """Clear grid and shades behind a name; lines, which lie above, stay whole."""
+def _fade_background(ground: _Ground, center: FloatArray, box: FloatArray) -> None:
+    """Draw a white, nearly opaque box behind a name, over grid and shades and below the curves."""
     from matplotlib.patches import Rectangle
 
     low, size = (center - box / 2 - 0.5) / ground.extent, (box + 1.0) / ground.extent

@@ -85,7 +85,7 @@ class FidelityComparison:
 
     @property
     def warnings(self) -> tuple[Finding, ...]:
-        """Left-out parts, and warnings of the others that the nominal one does not have."""
+        """A finding for each model left out, and the warnings of the others that the nominal one does not have."""
         reported = {item.name for item in self.variants[0].result.warnings}
         gone = [Finding("fidelity_left_out", f"{name!r} cannot run here: {why}") for name, why in self.left_out.items()]
         more = [

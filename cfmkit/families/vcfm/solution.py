@@ -111,7 +111,7 @@ class Solution(ShortRepr):
 
     @property
     def sampler(self) -> PartSampler:
-        """The model of the parts."""
+        """The model of leaves and spring."""
         return self.curves.sampler
 
     @cached_property
@@ -308,7 +308,7 @@ class Solution(ShortRepr):
 
     @cached_property
     def travel_leaf_stress(self) -> FloatArray:
-        """The same over the whole travel, (m,) [Pa]."""
+        """Largest stress of the leaves over the whole travel, over all preloads, (m,) [Pa]."""
         return self.leaf_stress()
 
     @cached_property

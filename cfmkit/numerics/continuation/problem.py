@@ -1,4 +1,4 @@
-"""Protocol of a structure whose equilibria are followed; an equilibrium, a border, sizes of motions and forces."""
+"""What a structure must offer to a solver that follows its equilibria; an equilibrium; sizes of motions and forces."""
 
 from __future__ import annotations
 

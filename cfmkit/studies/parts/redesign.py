@@ -128,8 +128,8 @@ class PartNumbers:
         """Errors of the parts that are solved, (n, d)."""
         return np.asarray(self.parts.draw(N_CHECKED_PARTS, self.parts.seed + SEARCH_SEED + 1) - self.parts.nominal)
 
-    def ends_early(self) -> int:
-        """Return how many of those parts have numbers, but not over all of the stated windows."""
+    def count_early_ends(self) -> int:
+        """Return how many of `N_CHECKED_PARTS` drawn parts have a curve, but not over all of the stated windows."""
         stated, x = stated_places(self.parts.spec), self.start
         if not stated:
             return 0
@@ -369,7 +369,7 @@ def _explain_no_design(design: Design, part: PartNumbers, good: int, worst: str,
         f": {value:.3g} % at most, of {N_CHECKED_PARTS} that were solved; largest contributor: {worst}: "
         f"make its tolerance tighter, {cure} or require less"
     )
-    if short := part.ends_early():
+    if short := part.count_early_ends():
         reported += (
             f". {short} of {N_CHECKED_PARTS} parts end before the windows of the requirements do: state "
             f"windows as shares of "

@@ -47,7 +47,10 @@ def list_requirements(
     space: BoundingBox | None,  # the box that it stays in
     values: Iterable[Definition],  # of the scalar results of its family
 ) -> tuple[dict[str, Any], ...]:
-    """Return the requirements that say what is required of a mechanism, over the window of its analysis."""
+    """Return the requirements that say what is required of a mechanism.
+
+    They are over the window of its analysis; stress and fatigue life over all motion that it has to bear.
+    """
     quantities = evaluate(result, None, None, values)
     return (
         *_require_effort(request),

@@ -90,9 +90,10 @@ def audit_design(task: Task, design: ShapeCandidate) -> Audit:
 
 
 def band_and_range(at: FloatArray, force: FloatArray, start: float) -> tuple[float, float]:
-    """Return (max - min)/(max + min) of a force from `start` on; and the largest share of its travel with 5 % of max.
+    """Return (max - min)/(max + min) of a force from `start` on, and the share of its travel that is flat at its end.
 
-    That is the share up to its end over which max - min is no more. Between poses the force is a cubic.
+    That is the longest share, counted back from the end, over which max - min is at most 5 % of max. Between poses the
+    force is a cubic.
     """
     from scipy.interpolate import CubicSpline
 

@@ -120,7 +120,7 @@ class Response:
 
     @cached_property
     def lengths(self) -> dict[str, Length]:
-        """Lengths of all beams."""
+        """Arc length and straightness (chord over arc) of every beam, with derivatives."""
         return lengths(self.variables, self.x, self.path.network)
 
     @cached_property

@@ -298,7 +298,7 @@ class Track:
 
     @property
     def pivot(self) -> Pivot:
-        """The triangle that a brace and the corner make."""
+        """The roller on the cam's corner: place of the corner, radius, brace, and the angles of the turn about it."""
         return Pivot(*self._corner_point, self.radius, self.brace_length, *self._pivots)
 
     @property

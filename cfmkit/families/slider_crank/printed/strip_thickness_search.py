@@ -199,9 +199,10 @@ class StripSearch:
 
     def read(self, record: dict[str, Any]) -> FoundStrip:
         """Return the strip of a record."""
-        return self.finish(from_record(Optimum, record["found"] | {"ending": SearchEnding[record["found"]["ending"]]}))
+        ending = SearchEnding[record["found"]["ending"]]
+        return self.make_strip(from_record(Optimum, record["found"] | {"ending": ending}))
 
-    def finish(self, descent: Optimum) -> FoundStrip:
+    def make_strip(self, descent: Optimum) -> FoundStrip:
         """Return the strip at which a search ended."""
         return FoundStrip(StripProgram(self.task, self.form), self.ranges, descent, self.uniform)
 
@@ -297,7 +298,7 @@ def search(
     best = min(strips, key=lambda strip: _rank(strip.descent))
     unsure = not (best.descent.feasible and best.descent.ending is SearchEnding.OPTIMUM)
     if task.goal == "stroke" and unsure and (tightened := work.tighten_band()) is not None:
-        best = min((best, work.finish(tightened)), key=lambda strip: _rank(strip.descent))
+        best = min((best, work.make_strip(tightened)), key=lambda strip: _rank(strip.descent))
     return replace(best, lost=outcome.lost)
 
 

@@ -1,4 +1,6 @@
-"""Design of springs for a target torque or force, and of lengths where they are free; which others are as good.
+"""Springs, and free lengths, for a torque or force in a given window, or in the widest that keeps a tolerance.
+
+It reports which other designs are as good.
 
 The effort is linear in the springs' rates: with the lengths given, the best rates are the solution of a linear
 programme or of a least-squares problem. Lengths are searched outside of that, on a grid

@@ -1,12 +1,12 @@
 """The widest window in which springs can keep an effort within a tolerance.
 
-First a local search, from the neighbourhood of the stretched position, or, where that has none, from the flattest place
-of the motion: for a width the place with the smallest largest deviation, the width by steps in the law
-deviation ~ width^3 inside a shrinking bracket.
+All beginnings are searched: a part of a window never deviates more than the window. So if a window that begins in
+[a, b] is to be wider than w, springs must keep the tolerance from b to a + w: one linear programme says whether they
+do. Where they do, the interval is halved, and windows from its middle are tried.
 
-Then all other places are ruled out, or found to be better. A part of a window never deviates more than the window. So
-if a window that begins in [a, b] is to be wider than w, springs must keep the tolerance from b to a + w: one linear
-programme says whether they do. Where they do, the interval is halved, and windows from its middle are tried.
+A window grows locally: for a width the place with the smallest largest deviation, the width by steps in the law
+deviation ~ width^3 inside a shrinking bracket. It begins at what was found, else beside the stretched position, or
+where that has none, at the flattest place of the motion.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from cfmkit.families.slider_crank.springs.rate_fit_task import SpringTask
 
 
-N_SEARCH_PLACES = 48  # places of a window during the search; the result is judged on `DENSE` ones
+N_SEARCH_PLACES = 48  # places of a window during the search; the result is judged on `N_WINDOW_PLACES`
 WIDTH_OVER_LEAD = 0.533  # width of the best window over the lead of the unloaded position, for 0.5 % and small angles
 MAX_STEPS = 24
 """Twenty halvings leave 1e-6 of a width, which ends the search; with steps by the law, the tests need ten."""
@@ -100,7 +100,7 @@ class _Everywhere:
         self.left, self.finished = MAX_PROGRAMMES, True
 
     def run(self) -> tuple[float, float] | None:
-        """Return the widest window, judged on `N_SEARCH_PLACES` places; None if there is none above `NARROWEST`."""
+        """Return the widest window, judged on `N_SEARCH_PLACES`; None if there is none above `MIN_WIDTH_SHARE`."""
         best: tuple[float, float] | None = None
         ends = np.linspace(self.first, self.last, N_START_INTERVALS + 1).tolist()
         queue = deque(itertools.pairwise(ends))

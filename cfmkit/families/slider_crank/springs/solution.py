@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from cfmkit.arrays import Several, ShortRepr
+from cfmkit.arrays import Named, Several, ShortRepr
 from cfmkit.families.largest_next_to_samples import finite_samples
 from cfmkit.families.rows import PlacesKept, rows_of, stack
 from cfmkit.families.slider_crank.springs.bistability_class import (
@@ -389,7 +389,7 @@ class Solution(ShortRepr):
         return Several((coupler[0] / legs, coupler[1] / legs)), Several((size * guide[0], size * guide[1]))
 
     def _rubbed_extremes(self, part: Literal["coupler", "guide"]) -> Ends:
-        """Return extremes of both friction branches, of all legs; NaN if friction holds the mechanism somewhere."""
+        """Return largest and smallest force [N] with friction, of all legs together; NaN if it sticks somewhere."""
         places, last = self.extremes.places.copy(), self.extremes.last
         places[:, 0] += NEXT_TO_START * (places[:, -1] - places[:, 0])
         of_ways = []
@@ -407,12 +407,12 @@ class Solution(ShortRepr):
     # --- rows for metrics ---------------------------------------------------------------------------------------------
 
     @property
-    def branch_efforts(self) -> dict[str, FloatArray]:
+    def branch_efforts(self) -> Named[FloatArray]:
         """Efforts by branch, (m, n) each; with friction there are two [N m or N]."""
         if self.friction_branches is None:
-            return {"load": self.effort}
+            return Named({"load": self.effort})
         forth, back = (self.broadcast(curves.effort) for curves in self.friction_branches)
-        return {"load": forth, "unload": back}
+        return Named({"load": forth, "unload": back})
 
     @property
     def branches(self) -> dict[str, CurveRows]:
