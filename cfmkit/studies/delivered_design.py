@@ -391,4 +391,6 @@ def _with_yield(spec: Spec, designer: Designer, run: Run) -> Design:
     clock = Clock.from_budgets(run.time_budget)
     half = None if run.time_budget is None else 0.5 * run.time_budget
     design = designer(spec, replace(run.part(0.0, 0.5), time_budget=half))
+    if designer is move_free_values and design.status is Status.INFEASIBLE:
+        design = Design(spec, Status.COMPLETE)  # margins may lead from what misses a requirement to what meets all
     return with_design_margins(spec, design, replace(run.part(0.5, 1.0), time_budget=clock.get_time_left()))
