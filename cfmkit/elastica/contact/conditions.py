@@ -98,12 +98,14 @@ class Conditions:
     def all(self) -> tuple[Condition, ...]:
         """The conditions in order: one of each contact of the arrays, by its number, those on sides, on friction."""
         contacts = enumerate(self.mesh.contacts)
-        own = [Condition("force" if k in self.closed else "gap", k, contact.item) for k, contact in contacts]
+        contact_conditions = [
+            Condition("force" if k in self.closed else "gap", k, contact.item) for k, contact in contacts
+        ]
         rubbing = [
             Condition("slip" if state.sense else "grip", k, self.mesh.contacts[k].item)
             for k, state in sorted(self.friction.items()) if state.sense != NO_FRICTION.sense
         ]  # fmt: skip
-        return *own, *self._find_on_sides(), *rubbing
+        return *contact_conditions, *self._find_on_sides(), *rubbing
 
     def find_row(self, kind: str, item: Contact, last: bool | None = None) -> int:
         """Return the number of the first condition of a kind on a contact, at one end of its beam if so requested."""
@@ -163,11 +165,11 @@ class Conditions:
 
     def roots(self, item: BeamSide) -> tuple[bool, ...]:
         """Return which ends of a beam are clamped so that they lie on an obstacle: False the first, True the last."""
-        known, key = self.mesh.fits.known, (Conditions.roots, item)
-        if key not in known:
+        cache, key = self.mesh.fits.known, (Conditions.roots, item)
+        if key not in cache:
             ends = (last for last in (False, True) if isinstance(item, BeamOnObstacle) and self._lies_at(item, last))
-            known[key] = tuple(ends)
-        return known[key]  # type: ignore[no-any-return]
+            cache[key] = tuple(ends)
+        return cache[key]  # type: ignore[no-any-return]
 
     def _lies_at(self, item: BeamOnObstacle, last: bool) -> bool:
         mesh, network = self.mesh, self.mesh.fits.network
@@ -194,14 +196,15 @@ class Conditions:
             mesh, touched, laid = self.mesh, list[int](), list[int]()
             elements, beam = list_elements(mesh, item.beam), mesh.fits.network.beams[item.beam]
             for number, contact in enumerate(mesh.contacts):
-                other: Any = contact.item
-                if other.name != item.name:
+                contact_item: Any = contact.item
+                if contact_item.name != item.name:
                     continue
-                if contact.slide >= 0 and other.beam == item.beam:
+                if contact.slide >= 0 and contact_item.beam == item.beam:
                     touched += [contact.element, contact.element + 1]
-                elif isinstance(other, NodeOnObstacle | NodeOnBeam) and number in self.closed:
-                    touched += [elements[0]] * (other.node == beam.start) + [elements[-1]] * (other.node == beam.end)
-                if contact.laid and other is item:
+                elif isinstance(contact_item, NodeOnObstacle | NodeOnBeam) and number in self.closed:
+                    touched += [elements[0]] * (contact_item.node == beam.start)
+                    touched += [elements[-1]] * (contact_item.node == beam.end)
+                if contact.laid and contact_item is item:
                     laid.append(contact.element + (contact.laid > 0))
             touched += [elements[-1] if last else elements[0] for last in self.roots(item)]
             self._gaps[item] = make_gaps(mesh, item, tuple(touched), tuple(laid))
@@ -229,14 +232,14 @@ class Conditions:
         """Return the values of all conditions in n states (n, size), (rows, n)."""
         rows, sides = self._touching
         together = None if sides is None else search_sides(self.mesh, sides, z, stage, watch=True)
-        known = {} if together is None else dict(zip(rows, together[:, :, 0].T, strict=True))
+        values_by_row = {} if together is None else dict(zip(rows, together[:, :, 0].T, strict=True))
         measured = self._equations.measure_nodes(z)
         if measured is not None:
             open_gaps = self.rows_of("gap")
-            known |= {k: measured[k] + raise_pad(self.mesh, self.mesh.contacts[k], z) for k in open_gaps}
+            values_by_row |= {k: measured[k] + raise_pad(self.mesh, self.mesh.contacts[k], z) for k in open_gaps}
         values = np.empty((len(self.all), len(z)))
         for row, condition in enumerate(self.all):
-            values[row] = known[row] if row in known else self.value(condition, z, stage)
+            values[row] = values_by_row[row] if row in values_by_row else self.value(condition, z, stage)
         return values
 
     @cached_property
@@ -272,8 +275,8 @@ class Conditions:
         return np.asarray(z[:, following.slide] - z[:, contact.slide] - NEW_PLACE)
 
     def _measure_way_to_end(self, condition: Condition, z: FloatArray, _stage: LoadStage) -> FloatArray:
-        way = condition.mark - z[:, self.mesh.contacts[condition.number].slide]
-        return np.asarray((way if condition.last else -way) - 0.5 * NEW_PLACE)
+        distance = condition.mark - z[:, self.mesh.contacts[condition.number].slide]
+        return np.asarray((distance if condition.last else -distance) - 0.5 * NEW_PLACE)
 
     def _measure_pull(self, condition: Condition, z: FloatArray, _stage: LoadStage) -> FloatArray:
         """Return the tension along a round obstacle, positive if it presses the side on."""
@@ -315,14 +318,14 @@ class Conditions:
     def _measure_spread(self, condition: Condition, z: FloatArray, _stage: LoadStage) -> FloatArray:
         """Return the curvature of the gap at a contact; of two beams the smaller one of the gap by both places."""
         mesh, contact = self.mesh, self.mesh.contacts[condition.number]
-        own = self._relative_curvature(contact, z)
+        curvature = self._relative_curvature(contact, z)
         if not isinstance(condition.item, BeamOnBeam):
-            return own
+            return curvature
         mate = find_mate(mesh, condition.item)
-        other = self._relative_curvature(mate, z)
+        mate_curvature = self._relative_curvature(mate, z)
         apart = _body_place(mesh, contact, z) - _body_place(mesh, mate, z)
         mixed = 1 / np.hypot(*apart.T)  # but for its sign: both are tangent
-        return np.asarray(0.5 * (own + other) - np.hypot(0.5 * (own - other), mixed))
+        return np.asarray(0.5 * (curvature + mate_curvature) - np.hypot(0.5 * (curvature - mate_curvature), mixed))
 
     def _relative_curvature(self, contact: ContactAt, z: FloatArray) -> FloatArray:
         """Return the curvature of the gap along a beam at a contact."""

@@ -213,8 +213,8 @@ def _follow(
             yield outcome.stop
             return
         walk, change, sense = outcome
-        near = abs(change.at.drive - place) <= SAME_PLACE * options.span
-        count, place = (count + 1 if near else 0), change.at.drive
+        is_same_place = abs(change.at.drive - place) <= SAME_PLACE * options.span
+        count, place = (count + 1 if is_same_place else 0), change.at.drive
         if count > MAX_CHANGES_AT_ONE_PLACE:
             yield PathStop(WhyStopped.LOST, place, "contacts begin and end without end at {place}")
             return
@@ -276,15 +276,15 @@ def _deliver_before(part: PieceOfPath, walk: Walk, place: float, at: PathEquilib
 
 def _go_on(part: PieceOfPath, walk: Walk, at: PathEquilibrium, sense: float) -> Iterator[Point | PathEvent | PathStop]:
     """Yield the items of the next piece: by the drive, or by the arc length where it leads away from the next value."""
-    own, options = part.own, walk.options
+    problem, options = part.own, walk.options
     start, step = part.shrink(at), max(walk.step, SHORTEST_STEP * options.span)
-    walk = Walk(own, options, walk.targets, start, step, walk.number, trail=(start,), branch=walk.branch)
+    walk = Walk(problem, options, walk.targets, start, step, walk.number, trail=(start,), branch=walk.branch)
     if sense == walk.sense:
         yield from each_point(follow_on(walk))
         return
-    tangent = unit_tangent(own, start, sense * np.append(start.rate, 1.0), options.span)
+    tangent = unit_tangent(problem, start, sense * np.append(start.rate, 1.0), options.span)
     length = float(FIRST_ARC * step / max(abs(tangent[-1]), SHORTEST_STEP))
-    move = next(follow_arc(own, start, tangent, min(length, options.largest_motion), options), None)
+    move = next(follow_arc(problem, start, tangent, min(length, options.largest_motion), options), None)
     if move is None:
         yield PathStop(WhyStopped.LOST, start.drive, "no step converged at {place}")
         return
@@ -309,37 +309,37 @@ def _follow_part(
             waiting.append(part.grow_event(item))
             continue
         if isinstance(item, PathStop):
-            found = find_change_before_end(part, previous, item)
-            if found is None:
+            change = find_change_before_end(part, previous, item)
+            if change is None:
                 yield from waiting
-                return EndOfPiece(item, _pass_point(walk, last), previous or walk.here)
+                return EndOfPiece(item, _pass_point(walk, last), previous or walk.current)
             at, step = None, item.drive
         else:
             (at, is_quiet), step = part.own.grow_watched(item.at), item.at.drive
-            found = None if is_quiet or previous is None else find_change(part, previous, at)
-        if found is not None:
+            change = None if is_quiet or previous is None else find_change(part, previous, at)
+        if change is not None:
             assert previous is not None
             walk = _pass_point(walk, last)
-            if isinstance(found, PathStop):
+            if isinstance(change, PathStop):
                 lost = next((event for event in waiting if event.after > event.before), None)
                 if lost is None:
-                    return EndOfPiece(found, walk, previous)
+                    return EndOfPiece(change, walk, previous)
                 yield from waiting  # the way on from there goes through an obstacle
                 return EndOfPiece(PathStop(WhyStopped.JUMPS, lost.drive, BUCKLES_AWAY), walk, previous)
             sense = 1.0 if step >= previous.drive else -1.0
-            place = found.at.drive
+            place = change.at.drive
             yield from (event for event in waiting if (place - event.drive) * sense > 0)
             walk = walk._replace(step=abs(step - previous.drive))
             tied = SAME_PLACE * walk.options.span
-            beside = abs(place - previous.drive) <= tied and found.piece is None
-            if found.piece is not None and found.piece.whole.mesh is not mesh:
-                yield Remeshed(found.piece.whole)
+            beside = abs(place - previous.drive) <= tied and change.piece is None
+            if change.piece is not None and change.piece.whole.mesh is not mesh:
+                yield Remeshed(change.piece.whole)
             if not walk.done and abs(walk.targets[walk.number] - place) <= tied and not beside:
-                yield Point(found.at, walk.number, walk.branch)
+                yield Point(change.at, walk.number, walk.branch)
                 walk = walk._replace(number=walk.number + 1)
             elif not beside:
-                yield Point(found.at, -1, walk.branch)
-            return walk, found, sense
+                yield Point(change.at, -1, walk.branch)
+            return walk, change, sense
         yield from waiting
         waiting = []
         assert isinstance(item, Point)
@@ -351,7 +351,7 @@ def _follow_part(
         last = item if item.target >= 0 or last is None else item._replace(target=last.target)
         previous = at
     walk = _pass_point(walk, last)
-    return EndOfPiece(PathStop(WhyStopped.LOST, walk.here.drive, "no step converged at {place}"), walk, walk.here)
+    return EndOfPiece(PathStop(WhyStopped.LOST, walk.current.drive, "no step converged at {place}"), walk, walk.current)
 
 
 def _pass_point(walk: Walk, point: Point | None) -> Walk:

@@ -139,8 +139,8 @@ class PieceOfPath:
 
     def stick_at(self, at: PathEquilibrium, number: int) -> FrictionState:
         """Return the state of friction of a contact that begins to stick at an equilibrium."""
-        way = slip_way(self.whole.mesh, self.whole.mesh.contacts[number], self.whole.values(at.x, at.drive))
-        return FrictionState(0.0, float(way.value))
+        slip = slip_way(self.whole.mesh, self.whole.mesh.contacts[number], self.whole.values(at.x, at.drive))
+        return FrictionState(0.0, float(slip.value))
 
     def stick_all(self, at: PathEquilibrium) -> PieceOfPath:
         """Return the piece in which all closed contacts with friction stick from an equilibrium on."""
@@ -191,22 +191,22 @@ class PieceOfPath:
     def grow_event(self, event: PathEvent) -> PathEvent:
         """Return an event whose equilibria have the forces of all contacts."""
         within = None if event.within is None else (self.grow(event.within[0]), self.grow(event.within[1]))
-        near = None if event.near is None else self.grow(event.near)
+        nearest = None if event.nearest is None else self.grow(event.nearest)
         modes = None if event.modes is None else self.expand(event.modes)
-        return replace(event, near=near, modes=modes, within=within)
+        return replace(event, nearest=nearest, modes=modes, within=within)
 
     def solve_near(self, at: PathEquilibrium) -> PathEquilibrium | None:
         """Return the equilibrium of this piece at the drive of one near it; both have the unknowns of all contacts."""
-        near = self.shrink(at)
-        found = self.own.solve(near.x, near.drive)
-        return None if found is None else self.grow(found)
+        guess = self.shrink(at)
+        solution = self.own.solve(guess.x, guess.drive)
+        return None if solution is None else self.grow(solution)
 
     def solve_at_level(self, begin: PathEquilibrium, row: dict[int, float], level: float) -> PathEquilibrium | None:
         """Return the equilibrium at which a combination of its own unknowns has a value, near one of all unknowns."""
-        near = self.shrink(begin)
-        border = np.zeros(len(near.x) + 1)
+        guess = self.shrink(begin)
+        border = np.zeros(len(guess.x) + 1)
         border[list(row)] = list(row.values())
-        state = self.own.solve(near.x, near.drive, Border(border, level))
+        state = self.own.solve(guess.x, guess.drive, Border(border, level))
         return state if state is not None and np.isfinite(state.rate).all() else None
 
     def is_locked(self, before: PathEquilibrium, at: PathEquilibrium) -> bool:
@@ -218,17 +218,17 @@ class PieceOfPath:
     # -- gaps and forces -----------------------------------------------------------------------------------------------
     def values(self, x: FloatArray, drives: FloatArray) -> FloatArray:
         """Return the values of all conditions in states (n, free), (rows, n)."""
-        mesh, way = self.whole.mesh, drives[:, None]
-        z = np.asarray(way * mesh.base if self.whole.ramp else mesh.base + way * mesh.rate)
+        mesh, drive_column = self.whole.mesh, drives[:, None]
+        z = np.asarray(drive_column * mesh.base if self.whole.ramp else mesh.base + drive_column * mesh.rate)
         z[:, mesh.free] = x
         return self.conditions.values(z, LoadStage.from_problem(self.whole, drives))
 
     def slip_rate(self, at: PathEquilibrium, number: int) -> float:
         """Return how far a contact slips in its sense by the drive, at an equilibrium."""
         mesh = self.whole.mesh
-        way = slip_way(mesh, mesh.contacts[number], self.whole.values(at.x, at.drive))
+        slip = slip_way(mesh, mesh.contacts[number], self.whole.values(at.x, at.drive))
         moved = self.moved_by_drive(at)
-        return float(self.friction[number].sense * (way.gradient @ moved[way.unknowns]))
+        return float(self.friction[number].sense * (slip.gradient @ moved[slip.unknowns]))
 
     def moved_by_drive(self, at: PathEquilibrium) -> FloatArray:
         """Return the change of all unknowns by the drive at an equilibrium, (size,)."""
@@ -368,7 +368,7 @@ class WatchedProblem(NetworkProblem):
         """Return the equilibria on the way to the next requested values, as far as nothing happens."""
         marched = super().march(walk)
         if len(marched.drive) and self.piece is not None:
-            states = [walk.here, *marched.states]
+            states = [walk.current, *marched.states]
             together = SIDES_TOGETHER if self.piece.conditions.rows_of("touch") else NODES_TOGETHER
             for first in range(0, len(states) - 1, together):
                 some = states[first : first + together + 1]

@@ -104,9 +104,9 @@ class StepBetween:
     def _follows_drive(self) -> bool:
         """True if motions go on with the drive at both ends: no limit point lies between them."""
         moves = self.part.whole.motions
-        chord, way = (self.last.x - self.first.x)[moves], self.last.drive - self.first.drive
+        chord, travel = (self.last.x - self.first.x)[moves], self.last.drive - self.first.drive
         return bool(self._steps.are_smooth[0]) and all(
-            float(at.rate[moves] @ chord) * way > 0 for at in (self.first, self.last)
+            float(at.rate[moves] @ chord) * travel > 0 for at in (self.first, self.last)
         )
 
     def share_of(self, at: PathEquilibrium, piece: PieceOfPath | None = None) -> float:
@@ -118,9 +118,9 @@ class StepBetween:
             return float((at.drive - self.first.drive) / (self.last.drive - self.first.drive))
         at = at if piece is None else piece.carry(at, self.part)
         weights = arc_weights(self.part.whole, self.part.options.span)
-        chord, way = self.last.place - self.first.place, at.place - self.first.place
+        chord, offset = self.last.place - self.first.place, at.place - self.first.place
         finite = np.isfinite(weights)
-        return float((weights * chord)[finite] @ way[finite] / ((weights * chord)[finite] @ chord[finite]))
+        return float((weights * chord)[finite] @ offset[finite] / ((weights * chord)[finite] @ chord[finite]))
 
     def contains(self, at: PathEquilibrium, guess: FloatArray) -> bool:
         """Return True if an equilibrium lies within the step, near a guess."""

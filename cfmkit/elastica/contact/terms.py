@@ -61,10 +61,10 @@ def gaps(mesh: Discretisation, contact: ContactAt, z: Any) -> Any:
     return (item.outline.distance(place * length).value - item.radius) / length
 
 
-def slip_way(mesh: Discretisation, contact: ContactAt, z: Any, near: float | None = None) -> MeasuredGap:
+def slip_way(mesh: Discretisation, contact: ContactAt, z: Any, anchor: float | None = None) -> MeasuredGap:
     """Return how far the point of a pad that touches has come along an obstacle or a stop, rolling counted.
 
-    The sense is that of the normal turned by -90 deg. Around a closed obstacle it is what is nearest to `near`.
+    The sense is that of the normal turned by -90 deg. Around a closed obstacle it is what is nearest to `anchor`.
     """
     item, length = contact.item, mesh.scales.length
     at = poses(mesh.attachments, z, [contact.place])
@@ -77,8 +77,8 @@ def slip_way(mesh: Discretisation, contact: ContactAt, z: Any, near: float | Non
         assert isinstance(item, NodeOnObstacle)
         slip, round_length = item.outline.way_along(place * length, item.radius), item.outline.round_length(item.radius)
         value, along, bend = slip.value / length, slip.gradient, slip.hessian * length
-        if near is not None and np.isfinite(round_length):
-            value = value - np.rint((np.real(value) - near) * length / round_length) * round_length / length
+        if anchor is not None and np.isfinite(round_length):
+            value = value - np.rint((np.real(value) - anchor) * length / round_length) * round_length / length
         radius = item.radius / length
     unknowns = at.unknowns[0]
     hessian = np.zeros((4, 4), np.result_type(bend, jacobian))

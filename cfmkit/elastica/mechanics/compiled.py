@@ -180,10 +180,15 @@ class CompiledEquations(NumpyEquations):
         return told
 
     def solve(
-        self, free: FloatArray, way: float, border: Border | None = None, tolerance: float = 1e-10, quick: bool = False
+        self,
+        free: FloatArray,
+        place: float,
+        border: Border | None = None,
+        tolerance: float = 1e-10,
+        quick: bool = False,
     ) -> PathEquilibrium | None:
         """Return an equilibrium, as the method in numpy does; `quick` is for the march, which has its own loop."""
-        solved = self._newton(free[None], [way], border, tolerance, quick)
+        solved = self._newton(free[None], [place], border, tolerance, quick)
         x, at, rate, (code, told, effort) = (values[0] for values in solved)
         if code:
             return None
@@ -191,22 +196,22 @@ class CompiledEquations(NumpyEquations):
         return PathEquilibrium(x, float(at), rate, int(unstable), float(effort))
 
     def solve_each(
-        self, free: FloatArray, way: FloatArray, tolerance: float = 1e-10, quick: bool = False
+        self, free: FloatArray, places: FloatArray, tolerance: float = 1e-10, quick: bool = False
     ) -> SolvedStates:
         """Return the equilibria near k guesses."""
-        x, ways, rate, outcomes = self._newton(free, way, None, tolerance, quick)
+        x, at, rate, outcomes = self._newton(free, places, None, tolerance, quick)
         converged = outcomes[:, 0] == 0
-        unstable = self._count_each(x, ways, np.where(converged, outcomes[:, 1], 0.0).astype(np.int64))
+        unstable = self._count_each(x, at, np.where(converged, outcomes[:, 1], 0.0).astype(np.int64))
         return SolvedStates(converged, x, rate, unstable, outcomes[:, 2])
 
-    def _newton(self, free: Any, way: Any, border: Border | None, *numbers: float) -> tuple[FloatArray, ...]:
+    def _newton(self, free: Any, places: Any, border: Border | None, *numbers: float) -> tuple[FloatArray, ...]:
         """Return unknowns, places of the way, slopes, and codes, counts and efforts (k, 3), from k guesses."""
-        x, ways = np.array(free, float, order="C"), np.array(way, float)
+        x, at = np.array(free, float, order="C"), np.array(places, float)
         rate, outcomes = np.empty(x.shape), np.zeros((len(x), 3))
         row, level = (NO_NUMBERS, 0.0) if border is None else (np.ascontiguousarray(border.row, float), border.level)
-        if self.code.solve(self.row, x, ways, row, rate, outcomes, level, *numbers):
+        if self.code.solve(self.row, x, at, row, rate, outcomes, level, *numbers):
             raise MemoryError
-        return x, ways, rate, outcomes
+        return x, at, rate, outcomes
 
     def compare(self, z: FloatArray, drive: FloatArray, degree: int, tolerance: float) -> ComparedStates | None:
         """Return how states (p, size) differ from equilibria of a higher degree; None unless all beams are plain."""

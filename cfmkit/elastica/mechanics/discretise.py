@@ -217,15 +217,15 @@ def discretise(
     cuts, laws = _cut_beams(network, fits, pieces, tension, flanks)
     point_loads = [
         (load, grows)
-        for grows, given in enumerate((network.loads, drive.loads))
-        for load in given
+        for grows, group in enumerate((network.loads, drive.loads))
+        for load in group
         if isinstance(load, PointLoad)
     ]
     numbering = number(_find_topology(network, degree, cuts, [load for load, _ in point_loads]))
     acting = iter(numbering.acting)
     springs = tuple(Attached(spring, next(acting)) for spring in network.springs)
     loads = tuple(Attached(load, next(acting), bool(grows)) for load, grows in point_loads)
-    places = np.array([pair for own in cuts.values() for pair in itertools.pairwise(own)])
+    places = np.array([pair for ends in cuts.values() for pair in itertools.pairwise(ends)])
     arrays = fill_arrays(numbering, scales, places, [(network, drive)], [fits], driven)
     attachments = Attachments(numbering.places, **{name: at[0] for name, at in arrays.places.items()})
     floors = np.array([_find_floor(beam, drive, scales, fits, name) for name, beam in network.beams.items()])
@@ -304,7 +304,7 @@ def _find_topology(network: Network, degree: int, cuts: Mapping[str, list[float]
         tuple(network.nodes),
         network.links,
         tuple(link.node for link in network.links if swings_with_master(network, link.node)),
-        tuple((b.start, b.end, b.start_joint == "pin", b.end_joint == "pin", len(own) - 1) for b, own in beams),
+        tuple((b.start, b.end, b.start_joint == "pin", b.end_joint == "pin", len(ends) - 1) for b, ends in beams),
         tuple(tuple(spring_ends(spring)) for spring in network.springs) + tuple((load.node,) for load in loads),
         tuple(contact.node for contact in network.contacts if not isinstance(contact, BeamSide)),
     )
@@ -334,10 +334,10 @@ def _number_contacts(
     first = numbering.size + len(touching)
     size = first + 3 * count
     for unknown, (k, contact), place in zip(itertools.count(numbering.size), touching, numbering.touching):
-        own = ContactAt(contact, place, unknown, k)
+        at = ContactAt(contact, place, unknown, k)
         if contact.friction:
-            own, size = own._replace(rub=size, flag=size + 1, anchor=size + 2), size + 3
-        contacts.append(own)
+            at, size = at._replace(rub=size, flag=size + 1, anchor=size + 2), size + 3
+        contacts.append(at)
     for unknown, flank in enumerate(flanks, start=first):
         item: Any = network.contacts[flank.number]
         on_beam = [element for element, name in enumerate(elements.beam) if name == item.beam]
@@ -375,8 +375,10 @@ def raise_degree(mesh: Discretisation, degree: int) -> Discretisation:
     ends, ahead = coarse.n_ends, numbering.size - coarse.size
     size = mesh.size + ahead
     contacts = tuple(
-        one._replace(**{name: value + ahead for name in UNKNOWNS_OF_CONTACTS if (value := getattr(one, name)) >= 0})
-        for one in mesh.contacts
+        contact._replace(
+            **{name: value + ahead for name in UNKNOWNS_OF_CONTACTS if (value := getattr(contact, name)) >= 0}
+        )
+        for contact in mesh.contacts
     )
     moving = mesh.moving
     if moving is not None:
@@ -394,14 +396,14 @@ def raise_degree(mesh: Discretisation, degree: int) -> Discretisation:
 def embed(mesh: Discretisation, fine: Discretisation, z: Any) -> Any:
     """Return a state (..., size) of a network in the unknowns of one of a higher degree: shapes are hierarchical."""
     ends, old, new = mesh.numbering.n_ends, mesh.elements.unknowns, fine.elements.unknowns
-    found = np.zeros((*z.shape[:-1], fine.size), z.dtype)
-    found[..., :ends] = z[..., :ends]
-    found[..., new[:, 8 : mesh.degree + 7]] = z[..., old[:, 8 : mesh.degree + 7]]
-    found[..., new[:, -2:]] = z[..., old[:, -2:]]
+    raised = np.zeros((*z.shape[:-1], fine.size), z.dtype)
+    raised[..., :ends] = z[..., :ends]
+    raised[..., new[:, 8 : mesh.degree + 7]] = z[..., old[:, 8 : mesh.degree + 7]]
+    raised[..., new[:, -2:]] = z[..., old[:, -2:]]
     behind = mesh.size - mesh.numbering.size
     if behind:
-        found[..., -behind:] = z[..., -behind:]
-    return found
+        raised[..., -behind:] = z[..., -behind:]
+    return raised
 
 
 def make_inextensible(mesh: Discretisation, elements: Any) -> Discretisation:

@@ -342,8 +342,8 @@ class BetweenPoints(ShortRepr):
             y[chosen], loads[chosen], is_solved[chosen] = spots.free[good], ways[good], True
         return self.path.with_states(self._numbers[nearest], y, loads, is_solved)
 
-    def _spots(self, y: FloatArray, wanted: FloatArray, _near: FloatArray) -> tuple[SolvedStates, FloatArray]:
-        """Return the equilibria at dimensionless places and their drives; `_near`: the drive at the nearest points."""
+    def _spots(self, y: FloatArray, wanted: FloatArray, _loads: FloatArray) -> tuple[SolvedStates, FloatArray]:
+        """Return the equilibria at dimensionless places and their drives; `_loads`: the drive at the nearest points."""
         return self._equations.solve_each(y, wanted), wanted
 
     @cached_property

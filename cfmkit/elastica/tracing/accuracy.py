@@ -46,8 +46,8 @@ def point_errors(path: Path, indices: Sequence[int]) -> FloatArray:
     """
     if not len(path) or not len(indices):
         return np.zeros(len(indices))
-    chosen, own, mesh = list(indices), path.at, path.mesh
-    z, drives, degree = own.z[chosen], own.drive[chosen], mesh.degree + DEGREES_MORE
+    chosen, equilibria, mesh = list(indices), path.at, path.mesh
+    z, drives, degree = equilibria.z[chosen], equilibria.drive[chosen], mesh.degree + DEGREES_MORE
     compared, effort_unit = equations(mesh).compare(z, drives, degree, NEXT_CORRECTION), 1.0
     if compared is None:
         compared = compare_states(path, z, drives)
@@ -55,20 +55,20 @@ def point_errors(path: Path, indices: Sequence[int]) -> FloatArray:
         compared = compared._replace(effort=load_displacement(Equilibria(mesh, compared.ends, drives), path.load_case))
     else:
         effort_unit = mesh.scales.moment / mesh.scales.drive
-    known = compared.converged & (compared.moved <= MAX_CHANGE)
-    for row in np.flatnonzero(known & (compared.unstable != path.unstable[chosen])):
+    comparable = compared.converged & (compared.moved <= MAX_CHANGE)
+    for row in np.flatnonzero(comparable & (compared.unstable != path.unstable[chosen])):
         alike = compared.is_as_stable(path.unstable[chosen])[row]
-        known[row] = alike or _is_critical(mesh, z[row], float(drives[row]))
+        comparable[row] = alike or _is_critical(mesh, z[row], float(drives[row]))
     efforts = np.abs(effort_unit * compared.effort - path.effort[chosen])
-    reach = float(np.abs(own.z[:, : mesh.numbering.n_ends]).max())
+    reach = float(np.abs(equilibria.z[:, : mesh.numbering.n_ends]).max())
     largest = float(compared.largest.max(initial=0.0))
     if max(reach, largest) <= ROUNDING_ERROR:  # nothing moves and nothing bears: no share of rounding is an error
-        return np.where(known, ROUNDING_ERROR, np.inf)
+        return np.where(comparable, ROUNDING_ERROR, np.inf)
     load = max(largest, NO_FORCE * reach, ROUNDING_ERROR)
     size = max(float(np.abs(path.effort).max()), NO_FORCE * max(load, reach) * mesh.scales.moment / mesh.scales.drive)
     bearing = np.maximum(efforts / size, compared.force / load) - ROUNDED_PLACES * _rises(path)[chosen] / size
     relative = np.maximum(bearing, compared.motion / max(reach, SMALL_MOTION))
-    return np.where(known, ERROR_SAFETY * relative + ROUNDING_ERROR, np.inf)
+    return np.where(comparable, ERROR_SAFETY * relative + ROUNDING_ERROR, np.inf)
 
 
 def compare_states(path: Path, z: FloatArray, drives: FloatArray) -> ComparedStates:
@@ -110,11 +110,13 @@ def polish(path: Path) -> Path:
     does not.
     """
     mesh, z = path.mesh, path.at.z.copy()
-    own = z[:, mesh.free]
-    solved = NetworkProblem(mesh).equations.solve_each(own, path.at.drive)
+    guess = z[:, mesh.free]
+    solved = NetworkProblem(mesh).equations.solve_each(guess, path.at.drive)
     count = int((mesh.free < mesh.n_motions).sum())
-    near = solved.converged & (np.abs(solved.free[:, :count] - own[:, :count]).max(axis=1, initial=0.0) < SAME_POINT)
-    z[:, mesh.free] = np.where(near[:, None], solved.free, own)
+    accepted = solved.converged & (
+        np.abs(solved.free[:, :count] - guess[:, :count]).max(axis=1, initial=0.0) < SAME_POINT
+    )
+    z[:, mesh.free] = np.where(accepted[:, None], solved.free, guess)
     return replace(path, at=replace(path.at, z=z))
 
 
@@ -146,9 +148,9 @@ MAX_TENSION = 1e4  # L sqrt(N/EI) of a beam beyond which it is pulled straight: 
 RECUT_SHARE = 0.15  # share of a beam from which on a taut element is cut again
 
 
-def find_tension(path: Path, known: Mapping[str, float]) -> dict[str, float]:
+def find_tension(path: Path, previous: Mapping[str, float]) -> dict[str, float]:
     """Return the beams whose elements are taut to their largest L sqrt(N/EI), if more than is known."""
-    e, found = path.mesh.elements, dict[str, float]()
+    e, tension = path.mesh.elements, dict[str, float]()
     if not len(path):
         return {}
     force = np.abs(path.at.z[:, e.unknowns[:, -2:]])
@@ -158,8 +160,8 @@ def find_tension(path: Path, known: Mapping[str, float]) -> dict[str, float]:
     resolved = np.where(whole < MAX_TENSION, whole, 0.0).max(axis=0)
     for number, (beam, (left, right)) in enumerate(zip(e.beam, e.cuts, strict=True)):
         if right - left > RECUT_SHARE and resolved[number] * (right - left) > TAUT_RATIO:
-            found[beam] = max(found.get(beam, 0.0), float(resolved[number]))
-    return {beam: value for beam, value in found.items() if MORE_TENSION * known.get(beam, 0.0) < value}
+            tension[beam] = max(tension.get(beam, 0.0), float(resolved[number]))
+    return {beam: value for beam, value in tension.items() if MORE_TENSION * previous.get(beam, 0.0) < value}
 
 
 def _tautness(path: Path, force: FloatArray) -> FloatArray:

@@ -134,8 +134,8 @@ def is_tight(spring: Any) -> bool:
 def _make_ramp(change: tuple[Change, bool], mesh: Discretisation, remesh: Remesh | None) -> NetworkProblem:
     """Return the problem whose way applies what is constant (`_ramps`), prestress or loads, from none to all."""
     alter, ramp = change
-    own = None if remesh is None else (lambda flanks: alter(remesh(flanks)))
-    return NetworkProblem(alter(mesh), ramp=ramp, remesh=own)
+    remesh_altered = None if remesh is None else (lambda flanks: alter(remesh(flanks)))
+    return NetworkProblem(alter(mesh), ramp=ramp, remesh=remesh_altered)
 
 
 def _remove_loads(mesh: Discretisation) -> Discretisation:
@@ -181,8 +181,8 @@ def _remove_floors(problem: NetworkProblem, at: PathEquilibrium) -> tuple[Networ
         beams, remesh = {mesh.elements.beam[number] for number in needless.tolist()}, problem.remesh
 
         def remesh_stiff(flanks: tuple[FlankPlace, ...]) -> Discretisation:
-            found = remesh(flanks)
-            return make_inextensible(found, [k for k, name in enumerate(found.elements.beam) if name in beams])
+            arrays = remesh(flanks)
+            return make_inextensible(arrays, [k for k, name in enumerate(arrays.elements.beam) if name in beams])
 
         stiff = replace(stiff, remesh=remesh_stiff)
     return stiff, correct(stiff, at.x, at.drive) or at

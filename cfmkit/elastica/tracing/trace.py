@@ -163,8 +163,9 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceA
             best, attempt = attempt, None
             continue
         attempt = attempt if math.isfinite(attempt.path.error) else _with_error(attempt)
-        near = tolerance < attempt.path.error < NEAR_ERROR_FACTOR * tolerance
-        if near and not (resolution.degree < MAX_DEGREE and _can_be_raised(attempt)):  # which corrects all its points
+        nearly_reached = tolerance < attempt.path.error < NEAR_ERROR_FACTOR * tolerance
+        is_raised = resolution.degree < MAX_DEGREE and _can_be_raised(attempt)  # which corrects all its points
+        if nearly_reached and not is_raised:
             attempt = _with_error(attempt._replace(path=polish(path)))
         path = attempt.path
         if best is None or not path.error > max(best.path.error, tolerance):
@@ -252,13 +253,13 @@ def _can_be_raised(attempt: TraceAttempt) -> bool:
     path = attempt.path
     complete = path.status is PathStatus.COMPLETE
     quiet = not attempt.start.events and not path.contact_events
-    return complete and quiet and path.error < MAX_RAISED_ERROR and _span(path) > 0
+    return complete and quiet and path.error < MAX_RAISED_ERROR and _range(path.load_case) > 0
 
 
 def _relocate(attempt: TraceAttempt, problem: NetworkProblem) -> list[float] | None:
     """Return the drives of the events of a path on a finer resolution, None if one of them is not there."""
     path, fine = attempt.path, problem.mesh
-    span = _span(path) / path.mesh.scales.drive
+    span = _range(path.load_case) / path.mesh.scales.drive
     lift = partial(_lift_free, path.mesh, fine)
     drives = []
     for event in attempt.events:
@@ -282,7 +283,7 @@ def _lift(event: PathEvent, drive: float, mesh: Discretisation, fine: Discretisa
         return at._replace(x=_lift_free(mesh, fine, at.x), rate=_lift_free(mesh, fine, at.rate))
 
     within = None if event.within is None else (lift(event.within[0]), lift(event.within[1]))
-    return replace(event, drive=drive, near=lift(event.near), modes=None, within=within)
+    return replace(event, drive=drive, nearest=lift(event.nearest), modes=None, within=within)
 
 
 def _with_error(attempt: TraceAttempt) -> TraceAttempt:
@@ -303,7 +304,7 @@ def _end_alike(path: Path, before: Path) -> bool:
     early = (PathStatus.LIMIT_POINT, PathStatus.BLOCKED, PathStatus.JUMPS, PathStatus.LOST, PathStatus.OUTSIDE)
     if path.status not in early or path.status is not before.status or not len(path) or not len(before):
         return False
-    return bool(abs(path.drive[-1] - before.drive[-1]) < SAME_END * _span(path))
+    return bool(abs(path.drive[-1] - before.drive[-1]) < SAME_END * _range(path.load_case))
 
 
 def _first_buckling(network: Network, drive: Drive, control: Control) -> Buckling | None:
@@ -365,9 +366,9 @@ def trace_on(
         vars(path)["error"] = max(points[1].error, CORRECTION_ERROR * start.problem.next_correction)
     if changes:
         touched = tuple(
-            ContactEvent(one.kind, one.contact, one.at.drive * unit, one.before, one.after, one.states)
-            for found in changes.values()
-            for one in found
+            ContactEvent(item.kind, item.contact, item.at.drive * unit, item.before, item.after, item.states)
+            for changes_at_point in changes.values()
+            for item in changes_at_point
         )
         marked = read_only(np.isin(np.arange(len(path)), list(changes)), np.bool_)
         path = replace(path, contact_events=touched, at_contact=marked)
@@ -427,10 +428,10 @@ def _settle_events(points: PointColumns, events: list[PathEvent], drive: Drive, 
 
     There the number of unstable directions is rounding.
     """
-    near = SAME_PLACE * _range(drive) / unit if events else 0.0
+    tolerance = SAME_PLACE * _range(drive) / unit if events else 0.0
     for event in reversed(events):  # of several the first counts
         if event.kind == "bifurcation":
-            points.unstable[np.abs(points.drive - event.drive) <= near] = min(event.before, event.after)
+            points.unstable[np.abs(points.drive - event.drive) <= tolerance] = min(event.before, event.after)
 
 
 def _name_branches(branches: Sequence[PathBranch | None], unit: float) -> Any:
@@ -478,7 +479,7 @@ def _are_settled(attempt: TraceAttempt, control: Control, before: Path | None) -
     folds = any(event.kind == "limit point" for event in attempt.events)
     if not attempt.events or not (folds or control.branch == "primary"):
         return True
-    limit = max(EVENT_TOLERANCE, control.tolerance) * _span(path)
+    limit = max(EVENT_TOLERANCE, control.tolerance) * _range(path.load_case)
     finer = raise_degree(path.mesh, path.mesh.degree + DEGREES_MORE)
     moves = finer.moving is not None  # then events are on other elements
     drives = None if moves else _relocate(attempt, replace(attempt.start.problem, mesh=finer))
@@ -487,12 +488,8 @@ def _are_settled(attempt: TraceAttempt, control: Control, before: Path | None) -
         return bool(np.abs(places - drives).max() * path.mesh.scales.drive <= limit)
     if before is None or len(before.events) != len(path.events):
         return False
-    shifts = [abs(one.drive - other.drive) for one, other in zip(path.events, before.events, strict=True)]
+    shifts = [abs(event.drive - earlier.drive) for event, earlier in zip(path.events, before.events, strict=True)]
     return max(shifts) <= limit
-
-
-def _span(path: Path) -> float:
-    return _range(path.load_case)
 
 
 def _range(drive: Drive) -> float:

@@ -109,8 +109,8 @@ def follow_alike(path: Path, networks: Sequence[Network], control: Control) -> F
     if not _goes_straight_on(path, control):
         return None
     efforts = np.full((len(networks), len(path.load_case.points)), np.nan)
-    own = _get_common_values(path.network)
-    alike = [k for k, network in enumerate(networks) if _get_common_values(network) == own]
+    common = _get_common_values(path.network)
+    alike = [k for k, network in enumerate(networks) if _get_common_values(network) == common]
     if alike:
         try:
             efforts[alike] = _follow(path, [networks[k] for k in alike], control)
@@ -144,8 +144,10 @@ def _goes_straight_on(path: Path, control: Control) -> bool:
     quiet = path.status is PathStatus.COMPLETE and not path.events and not path.unstable.any()
     simple = _get_common_values(path.network) is not None and arrays.pieces == 1 and not arrays.tension
     alone = control.imperfection or isinstance(path.load_case, Loading) or np.any(arrays.floored)
-    own = equations(arrays)
-    compiled = isinstance(own, CompiledEquations) and not own.follows  # those with contacts have arrays of their own
+    system = equations(arrays)
+    compiled = (
+        isinstance(system, CompiledEquations) and not system.follows
+    )  # those with contacts have arrays of their own
     return bool(rests and quiet and simple and not alone and compiled and not arrays.contacts)
 
 
@@ -298,7 +300,7 @@ def _follow_rest(
     path: Path, built: list[Network | NetworkOutcome], number: int, control: Control
 ) -> dict[int, FloatArray] | None:
     """Return the efforts of the networks behind one that was traced, by their numbers; None if they are not like it."""
-    rest = {k: one for k, one in enumerate(built) if k > number and not isinstance(one, NetworkOutcome)}
+    rest = {k: network for k, network in enumerate(built) if k > number and not isinstance(network, NetworkOutcome)}
     efforts = follow_alike(path, list(rest.values()), control)
     if efforts is None:
         return None
