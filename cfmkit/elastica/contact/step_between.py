@@ -109,7 +109,7 @@ class StepBetween:
             float(at.rate[moves] @ chord) * travel > 0 for at in (self.first, self.last)
         )
 
-    def share_of(self, at: PathEquilibrium, piece: PieceOfPath | None = None) -> float:
+    def find_share(self, at: PathEquilibrium, piece: PieceOfPath | None = None) -> float:
         """Return at which share of the step an equilibrium lies: by its drive, or by motions that do not follow it.
 
         It has the unknowns of another `piece` if that is given.
@@ -125,7 +125,7 @@ class StepBetween:
     def contains(self, at: PathEquilibrium, guess: FloatArray) -> bool:
         """Return True if an equilibrium lies within the step, near a guess."""
         start = largest_motion(self.part.whole, at.x - guess) <= MAX_MISS * self.moved + 1e-9
-        return start and -BESIDE_STEP <= self.share_of(at) <= 1 + BESIDE_STEP
+        return start and -BESIDE_STEP <= self.find_share(at) <= 1 + BESIDE_STEP
 
     def bisect(self, row: int) -> PathEquilibrium | None:
         """Return the equilibrium of the piece at which a condition is just met, by its drive alone; None if lost."""
@@ -137,7 +137,7 @@ class StepBetween:
             at = self.solve(share)
             if at is None:
                 raise ArithmeticError
-            return part.row_value(part.grow(at), row, self.travel)
+            return part.measure_condition(part.grow(at), row, self.travel)
 
         try:
             end = next(iter(self.find_negative(row)), len(self.shares) - 1)

@@ -240,8 +240,8 @@ def discretise(
     if driven is not None:
         rate[numbering.bodies[driven.node][driven.motion % FRAME_OF_DRIVE]] = driven.sense
     arms = ((attachments.arm[:, 0] != 0) | (attachments.arm[:, 1] != 0)).tobytes()
-    acts = [(attached.places, *_acts_on(attached.item)) for attached in (*springs, *loads)]
-    acts += [((contact.place,), *_acts_on(contact.item)) for contact in contacts]
+    acts = [(attached.places, *_find_actions(attached.item)) for attached in (*springs, *loads)]
+    acts += [((contact.place,), *_find_actions(contact.item)) for contact in contacts]
     free = find_free(numbering, tuple(held), arms, tuple(acts))
     if contacts:
         free = np.append(free, np.arange(numbering.size, size))
@@ -268,6 +268,7 @@ def _cut_beams(
 
 
 def _find_units(network: Network, drive: Drive, fits: BeamFits) -> MechanicsUnits:
+    """Return the mean beam length, EI of the first beam over its square, and the unit of the drive."""
     bundle = fits.bundle
     lengths = [np.real(fits[bundle.names[k]].length) for k in bundle.others]
     lengths += bundle.length[fits.number].real.tolist() if bundle.plain else []
@@ -352,8 +353,8 @@ def _number_contacts(
     return tuple(contacts), size
 
 
-def _acts_on(item: Any) -> tuple[bool, bool]:
-    """Return whether something acts on the place of an attachment, and whether on its rotation."""
+def _find_actions(item: Any) -> tuple[bool, bool]:
+    """Return whether a spring, load or contact acts on the place of an attachment, and whether on its rotation."""
     if isinstance(item, TorsionSpring):
         return False, True
     if isinstance(item, Stop) and item.turns:  # alone it holds no rotation
@@ -393,8 +394,8 @@ def raise_degree(mesh: Discretisation, degree: int) -> Discretisation:
     )  # fmt: skip
 
 
-def embed(mesh: Discretisation, fine: Discretisation, z: Any) -> Any:
-    """Return a state (..., size) of a network in the unknowns of one of a higher degree: shapes are hierarchical."""
+def refine_state(mesh: Discretisation, fine: Discretisation, z: Any) -> Any:
+    """Return a state (..., size) in the unknowns of the same network with a higher degree: shapes are hierarchical."""
     ends, old, new = mesh.numbering.n_ends, mesh.elements.unknowns, fine.elements.unknowns
     raised = np.zeros((*z.shape[:-1], fine.size), z.dtype)
     raised[..., :ends] = z[..., :ends]

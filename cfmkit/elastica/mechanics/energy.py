@@ -154,6 +154,7 @@ def term(mesh: Discretisation, acting: Attached | ContactAt, z: Any, drive: Any,
 
 
 def _end_poses(mesh: Discretisation, z: Any) -> tuple[AttachmentPoses, AttachmentPoses]:
+    """Return the poses of the first and of the last ends of all elements."""
     return tuple(poses(mesh.attachments, z, mesh.elements.ends[:, side]) for side in (0, 1))  # type: ignore[return-value]
 
 

@@ -106,7 +106,7 @@ class CompiledSides(CompiledEquations):
         return bool(self._lies(z[:, self.mesh.free]).any())
 
     def exchange(self, mesh: Discretisation) -> CompiledEquations:
-        """Return those with other contacts closed; their free unknowns are among these."""
+        """Return the equations with other contacts closed; their free unknowns are among these."""
         exchanged = super().exchange(mesh)
         for name in ("reference", "_flags"):
             vars(exchanged).pop(name, None)
@@ -117,7 +117,7 @@ class CompiledSides(CompiledEquations):
     linearise = _delegate("linearise")
     count_unstable = _delegate("count_unstable")
     resolve = _delegate("resolve")
-    soften = _delegate("soften")
+    find_softest = _delegate("find_softest")
 
     def measure_curvatures(self, z: FloatArray) -> FloatArray | None:
         """Return the curvatures of gaps at contacts of sides in n states, (sides, n); None where something lies."""

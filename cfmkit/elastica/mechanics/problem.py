@@ -87,14 +87,14 @@ class NetworkProblem:
         ]
 
     def march_whole(self, walk: Walk, stiffnesses: tuple[float, float]) -> MarchedSteps | None:
-        """Return the whole way from its start, None if something may happen: `march` begins with the steps taken.
+        """Return the steps to the last requested value, None if something may happen: then `march` begins with them.
 
-        Nothing does if all is stable, and no eigenvalue at either end as small as a stiffness by far.
+        Nothing happens if all is stable, and no eigenvalue at either end as small as a stiffness by far.
         """
         system = self.equations
         if not isinstance(system, CompiledEquations) or system.follows or self.mesh.fits.network.contacts:
             return None
-        march = self._march(walk, whole=True)
+        march = self._run_march(walk, whole=True)
         ends = zip(march.flexibilities, stiffnesses, strict=True)
         if march.code is MarchCode.DONE and all(0 < abs(soft) * stiffness < STIFF_SHARE for soft, stiffness in ends):
             return march
@@ -105,9 +105,10 @@ class NetworkProblem:
         """Return the equilibria on the way to the next requested values, as far as nothing happens."""
         begun: tuple[PathEquilibrium | None, Any] = vars(self).pop("_begun", (None, None))
         taken: NaturalMarch | None = begun[1] if begun[0] is walk.current and walk.before is None else None
-        return taken or self._march(walk)
+        return taken or self._run_march(walk)
 
-    def _march(self, walk: Walk, whole: bool = False) -> NaturalMarch:
+    def _run_march(self, walk: Walk, whole: bool = False) -> NaturalMarch:
+        """Return the steps from where a walk is; of a `whole` one with its softest modes and its error, too."""
         left = walk.targets[walk.number :]
         room = 2 * len(left) + N_SPARE_STATES
         if self.mesh.contacts:
@@ -149,7 +150,7 @@ class NetworkProblem:
 
     def is_stiff(self, at: PathEquilibrium, stiffness: float) -> bool:
         """Return True if no eigenvalue is as small as a stiffness by far: two powers of the flexibility say so."""
-        flexibility, _ = self.equations.soften(at.x, at.drive, self._any_vector, N_POWERS)
+        flexibility, _ = self.equations.find_softest(at.x, at.drive, self._any_vector, N_POWERS)
         return 0 < abs(flexibility) * stiffness < STIFF_SHARE
 
     def softest(self, at: PathEquilibrium, nearby_mode: FloatArray | None = None) -> tuple[float, FloatArray | None]:
@@ -158,7 +159,7 @@ class NetworkProblem:
             return abs(float(self.modes(at, 1)[0][0])), None
         vector = self._any_vector if nearby_mode is None else nearby_mode + MODE_MIX_SHARE * self._any_vector
         rounds = FIRST_POWERS if nearby_mode is None else N_POWERS
-        flexibility, mode = self.equations.soften(at.x, at.drive, vector, rounds)
+        flexibility, mode = self.equations.find_softest(at.x, at.drive, vector, rounds)
         return (1 / abs(flexibility) if flexibility else 0.0), mode
 
     @property
@@ -212,6 +213,7 @@ def _end_slopes(degree: int) -> FloatArray:
 
 @lru_cache(maxsize=64)
 def _any_vector(count: int) -> FloatArray:
+    """Return a unit vector (count,) that has a share of every mode."""
     vector = np.cos(np.arange(count) * np.arange(1, count + 1))
     return read_only(vector / np.linalg.norm(vector))
 

@@ -41,13 +41,13 @@ class BetweenLoads(BetweenPoints):
     def _effort_on(self, path: EquilibriumPath) -> FloatArray:
         return path.drive
 
-    def _spots(self, y: FloatArray, wanted: FloatArray, loads: FloatArray) -> tuple[SolvedStates, FloatArray]:
+    def _solve_places(self, y: FloatArray, wanted: FloatArray, loads: FloatArray) -> tuple[SolvedStates, FloatArray]:
         goals = wanted - self.rest / self.unit_of_motion
-        solved = [self._spot(*guess) for guess in zip(y, loads, goals, strict=True)]
+        solved = [self._solve_place(*guess) for guess in zip(y, loads, goals, strict=True)]
         ways = np.array([np.nan if spot is None else spot.drive for spot in solved])
         return self._equations.collect(solved), ways
 
-    def _spot(self, y: FloatArray, load: float, goal: float) -> PathEquilibrium | None:
+    def _solve_place(self, y: FloatArray, load: float, goal: float) -> PathEquilibrium | None:
         border = Border(self.row, goal)
         first = self._equations.solve(y, load, border)
         # the solver watches poses and forces: once more, so that the load is as exact as they are

@@ -89,7 +89,7 @@ def follow_together(
     at_first = int(len(targets) > 0 and targets[0] == start.drive)
     step, steepest = options.first_step * options.span, max(0.0, abs(start.stiffness))
     walk = Walk(problem, options, targets, start, step, at_first, trail=(start,), branch=branch, steepest=steepest)
-    return limit_points(_items(walk), options.most_points)
+    return limit_points(_follow_from_start(walk), options.most_points)
 
 
 def limit_points(items: Iterable[Any], most: int) -> Iterator[Any]:
@@ -107,7 +107,8 @@ def limit_points(items: Iterable[Any], most: int) -> Iterator[Any]:
                 return
 
 
-def _items(walk: Walk) -> Iterator[Item | MarchedSteps]:
+def _follow_from_start(walk: Walk) -> Iterator[Item | MarchedSteps]:
+    """Yield the items of a path: one march if nothing happens, else from a start that may be critical or unstable."""
     problem, options, start = walk.problem, walk.options, walk.current
     march_whole = getattr(problem, "march_whole", None)
     if march_whole is not None and not walk.done and not start.unstable:
@@ -149,7 +150,7 @@ def _walk_on(walk: Walk) -> Generator[Point | PathEvent | MarchedSteps, None, Wa
     march = getattr(walk.problem, "march", None)
     while not walk.done:
         if march is not None and walk.rejections == 0:
-            walk = yield from _march(walk, march)
+            walk = yield from _take_march(walk, march)
             if walk.done:
                 break
         outcome = yield from _step(walk)
@@ -172,7 +173,7 @@ def _look_ahead(walk: Walk) -> Iterator[PathEvent]:
             yield item
 
 
-def _march(walk: Walk, march: Callable[[Walk], MarchedSteps]) -> Generator[MarchedSteps, None, Walk]:
+def _take_march(walk: Walk, march: Callable[[Walk], MarchedSteps]) -> Generator[MarchedSteps, None, Walk]:
     """Yield the points of steps that a problem takes by itself, as far as nothing happens; return the walk there."""
     marched = march(walk)
     if len(marched.drive):
