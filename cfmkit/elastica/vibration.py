@@ -208,7 +208,7 @@ class _VibratingNetwork:
 
     def _add_inner_forces(self, stiffness: FloatArray, z: FloatArray, drive: float) -> None:
         """Add what forces that vary along elements do, and what positions inside do to them."""
-        e, at = self.fine.elements, energy.fields(self.fine, z, drive)
+        e, at = self.fine.elements, energy.compute_fields(self.fine, z, drive)
         softer, order = e.axial - e.shear, self.order
         f, g = 1 + softer * at.normal, softer * at.shear
         by_force = (g * at.cos - f * at.sin, g * at.sin + f * at.cos)

@@ -165,7 +165,7 @@ class Conditions:
 
     def roots(self, item: BeamSide) -> tuple[bool, ...]:
         """Return which ends of a beam are clamped so that they lie on an obstacle: False the first, True the last."""
-        cache, key = self.mesh.fits.known, (Conditions.roots, item)
+        cache, key = self.mesh.fits.cache, (Conditions.roots, item)
         if key not in cache:
             ends = (
                 last for last in (False, True) if isinstance(item, BeamOnObstacle) and self._lies_at_end(item, last)

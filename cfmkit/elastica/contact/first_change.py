@@ -39,8 +39,8 @@ def find_change_before_end(
     if previous is None or stop.end in (WhyStopped.COMPLETE, WhyStopped.FULL) or stop.drive == previous.drive:
         return None
     start = piece.shrink(previous)
-    last = correct(piece.own, start.x + (stop.drive - start.drive) * start.rate, stop.drive)
-    if last is None or largest_motion(piece.own, last.x - start.x) > piece.options.largest_motion:
+    last = correct(piece.own_problem, start.x + (stop.drive - start.drive) * start.rate, stop.drive)
+    if last is None or largest_motion(piece.own_problem, last.x - start.x) > piece.options.largest_motion:
         return None
     return find_change(piece, previous, piece.grow(last))
 

@@ -132,7 +132,7 @@ def _measure_margin_rates(
 def _can_step_on(piece: PieceOfPath, at: PathEquilibrium, sense: float) -> bool:
     """Return True if all conditions are met a small step further on."""
     start, step = piece.shrink(at), sense * TRIAL_STEP_FRACTION * piece.options.span
-    new = piece.own.solve(start.x + step * start.rate, start.drive + step)
+    new = piece.own_problem.solve(start.x + step * start.rate, start.drive + step)
     if new is None:
         return False
     grown = piece.grow(new)
@@ -195,8 +195,8 @@ def _follow_pieces(
     """Yield the items of a path piece by piece, with the changes of contacts between."""
     options, turns = part.options, _find_turns(part.whole, start.drive, targets)
     first = targets[: turns[0]]
-    items = follow(part.own, part.shrink(start), first, options, branch)
-    walk, count, place = Walk(part.own, options, first, start, 0.0, branch=branch), 0, np.inf
+    items = follow(part.own_problem, part.shrink(start), first, options, branch)
+    walk, count, place = Walk(part.own_problem, options, first, start, 0.0, branch=branch), 0, np.inf
     previous: PathEquilibrium | None = None
     while True:
         outcome = yield from _follow_to_change(part, items, walk, previous)
@@ -269,7 +269,7 @@ def _deliver_before(part: PieceOfPath, walk: Walk, place: float, at: PathEquilib
     """Yield what is requested between a change and the first place of a contact that moves or parts."""
     low, high = sorted((place, at.drive))
     while not walk.done and low != high and low <= walk.targets[walk.number] <= high:
-        reached = part.own.solve(part.shrink(at).x, float(walk.targets[walk.number]))
+        reached = part.own_problem.solve(part.shrink(at).x, float(walk.targets[walk.number]))
         if reached is None:
             break
         yield Point(part.grow(reached), walk.number, walk.branch)
@@ -281,7 +281,7 @@ def _follow_next_piece(
     part: PieceOfPath, walk: Walk, at: PathEquilibrium, sense: float
 ) -> Iterator[Point | PathEvent | PathStop]:
     """Yield the items of the next piece: by the drive, or by the arc length where it leads away from the next value."""
-    problem, options = part.own, walk.options
+    problem, options = part.own_problem, walk.options
     start, step = part.shrink(at), max(walk.step, SHORTEST_STEP * options.span)
     walk = Walk(problem, options, walk.targets, start, step, walk.number, trail=(start,), branch=walk.branch)
     if sense == walk.sense:
@@ -320,7 +320,7 @@ def _follow_to_change(
                 return EndOfPiece(item, _pass_point(walk, last), previous or walk.current)
             at, step = None, item.drive
         else:
-            (at, is_quiet), step = part.own.grow_watched(item.at), item.at.drive
+            (at, is_quiet), step = part.own_problem.grow_watched(item.at), item.at.drive
             change = None if is_quiet or previous is None else find_change(part, previous, at)
         if change is not None:
             assert previous is not None

@@ -48,7 +48,7 @@ class PieceOfPath:
     seen_between: dict[tuple[float, float], FloatArray] = field(init=False, default_factory=dict)  # values by drives
 
     @cached_property
-    def own(self) -> WatchedProblem:
+    def own_problem(self) -> WatchedProblem:
         """The problem whose contacts neither begin nor end."""
         assert self.whole.equations is not None  # from which those of the piece are made
         mesh = with_closed(self.whole.mesh, self.closed, self.friction)
@@ -151,7 +151,7 @@ class PieceOfPath:
     def own_mask(self) -> Any:
         """Which free unknowns of the whole are those of the own problem."""
         mask = np.zeros(len(self.whole.mesh.free), bool)
-        mask[np.searchsorted(self.whole.mesh.free, self.own.mesh.free)] = True
+        mask[np.searchsorted(self.whole.mesh.free, self.own_problem.mesh.free)] = True
         return mask
 
     def shrink(self, at: PathEquilibrium) -> PathEquilibrium:
@@ -198,7 +198,7 @@ class PieceOfPath:
     def solve_near(self, at: PathEquilibrium) -> PathEquilibrium | None:
         """Return the equilibrium of this piece at the drive of one near it; both have the unknowns of all contacts."""
         guess = self.shrink(at)
-        solution = self.own.solve(guess.x, guess.drive)
+        solution = self.own_problem.solve(guess.x, guess.drive)
         return None if solution is None else self.grow(solution)
 
     def solve_at_level(self, begin: PathEquilibrium, row: dict[int, float], level: float) -> PathEquilibrium | None:
@@ -206,7 +206,7 @@ class PieceOfPath:
         guess = self.shrink(begin)
         border = np.zeros(len(guess.x) + 1)
         border[list(row)] = list(row.values())
-        state = self.own.solve(guess.x, guess.drive, Border(border, level))
+        state = self.own_problem.solve(guess.x, guess.drive, Border(border, level))
         return state if state is not None and np.isfinite(state.rate).all() else None
 
     def is_locked(self, before: PathEquilibrium, at: PathEquilibrium) -> bool:
@@ -298,7 +298,7 @@ class PieceOfPath:
     def find_own_slot(self, number: int, slide: bool = False) -> int:
         """Return the number of a contact's force, or place, among the free unknowns of the own problem."""
         contact = self.whole.mesh.contacts[number]
-        return int(np.searchsorted(self.own.mesh.free, contact.slide if slide else contact.unknown))
+        return int(np.searchsorted(self.own_problem.mesh.free, contact.slide if slide else contact.unknown))
 
 
 @lru_cache(maxsize=64)

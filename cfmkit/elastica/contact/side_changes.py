@@ -247,7 +247,7 @@ def _pass_force_on(piece: PieceOfPath, at: PathEquilibrium, beyond: PieceOfPath,
 
 def _zero_of(piece: PieceOfPath, begin: PathEquilibrium, row: int) -> PathEquilibrium | None:
     """Return the equilibrium at which a condition is just met, near a guess: by secants of the drive."""
-    at = piece.own.solve(piece.shrink(begin).x, begin.drive)
+    at = piece.own_problem.solve(piece.shrink(begin).x, begin.drive)
     if at is None:
         return None
     drives, values = list[float](), list[float]()
@@ -266,7 +266,7 @@ def _zero_of(piece: PieceOfPath, begin: PathEquilibrium, row: int) -> PathEquili
         goal = at.drive - value / slope
         if goal == at.drive or (len(values) > 3 and abs(value) >= abs(values[-2])):
             return whole
-        solved = piece.own.solve(at.x + (goal - at.drive) * at.rate, goal)
+        solved = piece.own_problem.solve(at.x + (goal - at.drive) * at.rate, goal)
         if solved is None:
             return None
         at = solved
@@ -443,5 +443,5 @@ def _lay_or_free(piece: PieceOfPath, change: ContactChange, sense: float) -> Ent
         guess_laid(new, full, element, float(z[side_contact[-2:]] @ along))
     else:
         full[new.elements.unknowns[element, -2:]] = z[side_contact[-2]] * along
-    at = beyond.own.solve(full[new.free][beyond.own_mask], change.at.drive)
+    at = beyond.own_problem.solve(full[new.free][beyond.own_mask], change.at.drive)
     return None if at is None else (beyond, beyond.grow(at), sense)

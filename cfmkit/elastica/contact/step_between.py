@@ -85,8 +85,9 @@ class StepBetween:
     def solve(self, share: float) -> PathEquilibrium | None:
         """Return the equilibrium of the piece at a share of the step."""
         x, drive = self.interpolate(share)
-        at = correct(self.part.own, x[self.part.own_mask], drive)
-        if at is None or largest_motion(self.part.own, at.x - x[self.part.own_mask]) > MAX_MISS * self.moved + 1e-9:
+        problem, guess = self.part.own_problem, x[self.part.own_mask]
+        at = correct(problem, guess, drive)
+        if at is None or largest_motion(problem, at.x - guess) > MAX_MISS * self.moved + 1e-9:
             return None
         return at
 

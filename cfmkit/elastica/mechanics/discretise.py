@@ -145,13 +145,13 @@ class Discretisation:
     moving: MovingCuts | None = None  # None: no end of an element moves
 
     @cached_property
-    def known(self) -> dict[Any, Any]:
-        """Cache of objects made of these arrays, by their maker; it does not go to other processes."""
+    def cache(self) -> dict[Any, Any]:
+        """Objects made of these arrays, by their maker; they do not go to other processes."""
         return {}
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what is sent to another process."""
-        return {name: value for name, value in self.__dict__.items() if name != "known"}
+        return {name: value for name, value in self.__dict__.items() if name != "cache"}
 
     @property
     def bodies(self) -> Mapping[str, tuple[int, int, int]]:
@@ -417,7 +417,7 @@ def make_inextensible(mesh: Discretisation, elements: Any) -> Discretisation:
 
 def keep_equations(mesh: Discretisation, changed: Discretisation) -> Discretisation:
     """Return arrays that differ in closed contacts and stretching alone, with equations made from those of a mesh."""
-    equations = ((key, made) for key, made in mesh.known.items() if hasattr(made, "exchange"))
+    equations = ((key, made) for key, made in mesh.cache.items() if hasattr(made, "exchange"))
     exchanged = ((key, made.exchange(changed)) for key, made in equations)
-    changed.known.update((key, made) for key, made in exchanged if made is not None)
+    changed.cache.update((key, made) for key, made in exchanged if made is not None)
     return changed

@@ -60,7 +60,7 @@ class SectionFields(SectionForces):
     Tables of elements may be dual, too. `slope_x`, `slope_y` and `turning` have derivatives then.
     """
 
-    curvature: Any  # phi' by the element's parameter, of `fields`
+    curvature: Any  # phi' by the element's parameter, of `compute_fields`
 
     def __init__(self, elements: BeamElements, angle: Any, h: Any, v: Any) -> None:
         """Compute the forces; the rest when it is needed."""
@@ -108,7 +108,7 @@ class SectionFields(SectionForces):
         return chain(self.shear * f, partials, self.all_arguments)
 
 
-def fields(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> SectionFields:
+def compute_fields(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> SectionFields:
     """Return rotations and section forces at the Gauss points, of one state (size,) or of several (n, size)."""
     e, rule = mesh.elements, basis(mesh.degree)
     element_unknowns = z[..., e.unknowns]
@@ -138,7 +138,7 @@ def line_load(mesh: Discretisation, drive: Any, share: Any = 1.0) -> Any:
 def gradient(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
     """Return the gradient of the functional by all unknowns, (size,); complex where z or the arrays are."""
     element_rows, kind = element_gradients(mesh, z, drive, share)
-    parts = [term(mesh, acting, z, drive, share) for acting in mesh.acting]
+    parts = [evaluate_term(mesh, acting, z, drive, share) for acting in mesh.acting]
     total = np.zeros(mesh.size, np.result_type(kind, *(part.gradient for part in parts)))
     np.add.at(total, mesh.elements.unknowns, element_rows)
     for part in parts:
@@ -146,7 +146,9 @@ def gradient(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
     return total
 
 
-def term(mesh: Discretisation, acting: Attached | ContactAt, z: Any, drive: Any, share: Any = 1.0) -> Contribution:
+def evaluate_term(
+    mesh: Discretisation, acting: Attached | ContactAt, z: Any, drive: Any, share: Any = 1.0
+) -> Contribution:
     """Return the term of a spring, a load or a contact in one state."""
     if isinstance(acting, ContactAt):
         return contact_contribution(mesh, acting, z)
@@ -177,7 +179,7 @@ def element_forces(mesh: Discretisation, z: Any, drive: Any, share: Any) -> Iter
 
     The arrays of the network, and the unknowns, may be dual.
     """
-    e, rule, at = mesh.elements, basis(mesh.degree), fields(mesh, z, drive, share)
+    e, rule, at = mesh.elements, basis(mesh.degree), compute_fields(mesh, z, drive, share)
     start, end = _end_poses(mesh, z)
     last = z[..., e.unknowns[:, -2:]]
     first = last + line_load(mesh, drive, share) * e.length[..., None]
@@ -193,7 +195,7 @@ def element_forces(mesh: Discretisation, z: Any, drive: Any, share: Any) -> Iter
 
 def hessian(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
     """Return the Hessian by all unknowns, (size, size): symmetric unless loads follow."""
-    e, rule, at = mesh.elements, basis(mesh.degree), fields(mesh, z, drive, share)
+    e, rule, at = mesh.elements, basis(mesh.degree), compute_fields(mesh, z, drive, share)
     start, end = _end_poses(mesh, z)
     columns, (f, g) = rotation_columns(mesh.degree), at.factors
     blocks = np.zeros((*e.unknowns.shape, e.unknowns.shape[1]))
@@ -217,12 +219,12 @@ def hessian(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
     total = np.zeros((mesh.size, mesh.size))
     np.add.at(total, (e.unknowns[:, :, None], e.unknowns[:, None, :]), blocks)
     for acting in mesh.acting:
-        part = term(mesh, acting, z, drive, share)
+        part = evaluate_term(mesh, acting, z, drive, share)
         np.add.at(total, (part.unknowns[:, None], part.unknowns), part.hessian)
     return total
 
 
-def values(mesh: Discretisation, free: Any, drive: Any, share: Any = 1.0) -> Any:
+def expand_unknowns(mesh: Discretisation, free: Any, drive: Any, share: Any = 1.0) -> Any:
     """Return all unknowns from the free ones: held ones are displaced by their share, and by the drive."""
     z = share * mesh.base + drive * mesh.rate
     z = z.astype(np.result_type(z, free))

@@ -180,12 +180,12 @@ class NumpyEquations:
 
     def values(self, free: Any, place: Any) -> Any:
         """Return all unknowns, (size,)."""
-        return energy.values(self.mesh, free, *self.factors(place))
+        return energy.expand_unknowns(self.mesh, free, *self.factors(place))
 
     def gradient(self, free: Any, place: Any) -> Any:
         """Return the gradient by all unknowns, (size,)."""
         drive, share = self.factors(place)
-        return energy.gradient(self.mesh, energy.values(self.mesh, free, drive, share), drive, share)
+        return energy.gradient(self.mesh, energy.expand_unknowns(self.mesh, free, drive, share), drive, share)
 
     def _leave_to_functions(self, *_: Any, **__: Any) -> Any:
         """Return None: what `CompiledEquations` computes under these names functions in numpy compute elsewhere."""
@@ -204,7 +204,7 @@ class NumpyEquations:
     def linearise(self, free: FloatArray, place: float) -> LinearEquations:
         """Return the equations linearised at some unknowns."""
         drive, share = self.factors(place)
-        z, chosen = energy.values(self.mesh, free, drive, share), self.mesh.free
+        z, chosen = energy.expand_unknowns(self.mesh, free, drive, share), self.mesh.free
         tangent = energy.hessian(self.mesh, z, drive, share)[np.ix_(chosen, chosen)]
         stepped = self.gradient(free, place + 1j * COMPLEX_STEP)[chosen]
         return LinearEquations(stepped.real.copy(), tangent, stepped.imag / COMPLEX_STEP)

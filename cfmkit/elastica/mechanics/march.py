@@ -42,19 +42,19 @@ def equations(
 ) -> NumpyEquations:
     """Return the equations of a network, compiled if they can be."""
     key = equations, ramp, load_compiled() is not None
-    if key not in mesh.known:
+    if key not in mesh.cache:
         compiled = key[2] and _is_compiled(mesh)
         if mesh.moving is not None and compiled:
-            mesh.known[key] = CompiledSides(copy_moved_tables(mesh) if mesh.elements.weight.ndim > 2 else mesh, ramp)
+            mesh.cache[key] = CompiledSides(copy_moved_tables(mesh) if mesh.elements.weight.ndim > 2 else mesh, ramp)
         elif mesh.moving is not None:
-            mesh.known[key] = SlidingEquations.from_mesh(mesh, ramp, equations)
+            mesh.cache[key] = SlidingEquations.from_mesh(mesh, ramp, equations)
         elif compiled:
-            mesh.known[key] = CompiledEquations(mesh, ramp)
+            mesh.cache[key] = CompiledEquations(mesh, ramp)
         elif mesh.contacts:
-            mesh.known[key] = ContactEquations(mesh, ramp, plain=equations(open_all_contacts(mesh), ramp))
+            mesh.cache[key] = ContactEquations(mesh, ramp, plain=equations(open_all_contacts(mesh), ramp))
         else:
-            mesh.known[key] = NumpyEquations(mesh, ramp)
-    return mesh.known[key]  # type: ignore[no-any-return]
+            mesh.cache[key] = NumpyEquations(mesh, ramp)
+    return mesh.cache[key]  # type: ignore[no-any-return]
 
 
 def _is_compiled(mesh: Discretisation) -> bool:

@@ -53,7 +53,7 @@ class BetweenLoads(BetweenPoints):
         # the solver watches poses and forces: once more, so that the load is as exact as they are
         return None if first is None else self._equations.solve(first.x, first.drive, border)
 
-    def _counts(self, _nearest: Any, left: Any) -> Any:
+    def _find_allowed_counts(self, _nearest: Any, left: Any) -> Any:
         return np.stack([self._unstable[left], self._unstable[left + 1]], axis=1)  # a largest load: two of each kind
 
     @cached_property

@@ -333,7 +333,7 @@ class BetweenPoints(ShortRepr):
         asked = np.flatnonzero(~is_known)
         if len(asked):
             spots, ways = self._solve_places(y[asked], wanted[asked], loads[asked])
-            alike = (spots.unstable[:, None] == self._counts(nearest[asked], left[asked])).any(axis=1)
+            alike = (spots.unstable[:, None] == self._find_allowed_counts(nearest[asked], left[asked])).any(axis=1)
             moved = self._poses(spots.free - y[asked])
             good = (
                 spots.converged & alike & (moved <= np.maximum(MIN_STRAY_DISTANCE, MAX_RELATIVE_STRAY * changes[asked]))
@@ -362,7 +362,7 @@ class BetweenPoints(ShortRepr):
         mesh = self.path.mesh
         return np.asarray(np.abs(changes[:, mesh.free < mesh.n_motions]).max(axis=1, initial=0.0))
 
-    def _counts(self, nearest: Any, _left: Any) -> Any:
+    def _find_allowed_counts(self, nearest: Any, _left: Any) -> Any:
         """Return how many unstable directions equilibria may have, (n, k); `_left`: the points before them."""
         return self._unstable[nearest][:, None]
 
@@ -468,7 +468,7 @@ class BetweenPoints(ShortRepr):
             nearby = place + share * (drive[point] - place)
             spots, _ = self._solve_places(values_at(x, y, np.array([nearby])), np.array([nearby]), np.array([nearby]))
             beside = np.array([point])
-            if not spots.converged[0] or spots.unstable[0] not in self._counts(beside, beside):
+            if not spots.converged[0] or spots.unstable[0] not in self._find_allowed_counts(beside, beside):
                 if share == CORNER_SHARES[0]:
                     return None
                 break  # of a bifurcation just behind the rest, the place is known less closely

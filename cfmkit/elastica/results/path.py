@@ -427,7 +427,7 @@ def load_displacement(at: Equilibria, drive: Loading) -> Any:
 
 def strain_energy(at: Equilibria) -> Any:
     """Return the strain energy of beams and springs, (p,), dimensionless."""
-    e, fields = at.mesh.elements, energy.fields(at.mesh, at.z, at.drive)
+    e, fields = at.mesh.elements, energy.compute_fields(at.mesh, at.z, at.drive)
     density = 2 * bending(e, fields.curvature).energy + e.axial * fields.normal**2 + e.shear * fields.shear**2
     total = (e.weight * density).sum(axis=(1, 2)) / 2
     for spring in at.mesh.springs:
