@@ -122,9 +122,9 @@ class LazyMapping(Mapping[str, ValueT]):
     def __contains__(self, name: object) -> bool:
         return name in self._names
 
-    def __or__(self, other: Mapping[str, ValueT]) -> LazyMapping[ValueT]:
+    def __or__(self, replacements: Mapping[str, ValueT]) -> LazyMapping[ValueT]:
         """Return these values with others, which replace those of the same name."""
-        return LazyMapping(self._names, self._compute, {**self._known, **other})
+        return LazyMapping(self._names, self._compute, {**self._known, **replacements})
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Named, (dict(self),)

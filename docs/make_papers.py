@@ -66,7 +66,7 @@ def _section(paper: str, done: Sequence[ComputedRow]) -> Iterator[str]:
 def _here(one: ComputedRow) -> str:
     if one.row.verdict == "given":
         return "the same"
-    return ", ".join(one.row.here if one.skipped else one.computed)
+    return ", ".join(one.row.expected if one.skipped else one.computed)
 
 
 def _cell(text: str) -> str:

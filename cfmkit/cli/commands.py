@@ -69,14 +69,15 @@ def _import_verb(name: str) -> ModuleType:
     return import_module(f"{verbs.__name__}.{name.replace('-', '_')}")
 
 
-def _options_of(module: ModuleType) -> Any:
+def _find_options_class(module: ModuleType) -> Any:
+    """Return the class of the options that the `run` of a verb takes."""
     return vars(module)[module.run.__annotations__["options"]]
 
 
 def _make_command(name: str) -> Any:
     """Return the command of a verb: its options are the fields of what its `run` takes."""
     module = _import_verb(name)
-    options = module.make_options() if hasattr(module, "make_options") else _options_of(module)
+    options = module.make_options() if hasattr(module, "make_options") else _find_options_class(module)
 
     def callback(**values: Any) -> Call:
         return Call(module.run, options(**values))

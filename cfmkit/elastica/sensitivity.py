@@ -103,8 +103,8 @@ class Gradient:
     def effort(self) -> FloatArray:
         """Derivatives of `EquilibriumPath.effort`, (p, k)."""
         if isinstance(self.path.load_case, Loading):
-            each = zip(self.designs.networks, self.stepped, strict=True)
-            columns = [load_displacement(at, drive) for (_, drive), at in each if isinstance(drive, Loading)]
+            pairs = zip(self.designs.networks, self.stepped, strict=True)
+            columns = [load_displacement(at, drive) for (_, drive), at in pairs if isinstance(drive, Loading)]
             return read_only(np.imag(np.stack(columns, axis=-1)) / COMPLEX_STEP)
         try:
             if "_forces" in vars(self):  # as by `effort_slopes`, which needs less than these

@@ -31,7 +31,7 @@ from numpy.polynomial import legendre
 
 from cfmkit.arrays import ShortRepr, read_only
 from cfmkit.elastica.mechanics import energy
-from cfmkit.elastica.mechanics.discretise import Discretisation, embed, raise_degree
+from cfmkit.elastica.mechanics.discretise import Discretisation, raise_degree, refine_state
 from cfmkit.elastica.mechanics.polynomials import basis, shape_functions
 from cfmkit.elastica.mechanics.poses import poses
 from cfmkit.elastica.model.drive import Loading
@@ -119,7 +119,7 @@ def frequencies(
     grows = np.zeros((2, len(chosen)), dtype=bool)
     unit = np.sqrt(fine.scales.force / fine.scales.length) / (2 * np.pi)
     for k, point in enumerate(chosen.tolist()):
-        z = embed(path.mesh, fine, path.at.z[point])
+        z = refine_state(path.mesh, fine, path.at.z[point])
         matrices = system.assemble_matrices(z, float(path.at.drive[point]))
         row = system.row_of(z, *hold) if hold is not None and by_load else None
         (squares, *still), (others, *loose) = (
@@ -208,7 +208,7 @@ class _VibratingNetwork:
 
     def _add_inner_forces(self, stiffness: FloatArray, z: FloatArray, drive: float) -> None:
         """Add what forces that vary along elements do, and what positions inside do to them."""
-        e, at = self.fine.elements, energy.fields(self.fine, z, drive)
+        e, at = self.fine.elements, energy.compute_fields(self.fine, z, drive)
         softer, order = e.axial - e.shear, self.order
         f, g = 1 + softer * at.normal, softer * at.shear
         by_force = (g * at.cos - f * at.sin, g * at.sin + f * at.cos)

@@ -265,7 +265,7 @@ class Measurement:
     # raw, filtered: metrics by name, SI; `filtered` is empty without a filter
     raw: Mapping[str, Quantity]
     filtered: Mapping[str, Quantity]
-    each: tuple[Mapping[str, Quantity], ...]  # raw metrics of every cycle
+    cycle_metrics: tuple[Mapping[str, Quantity], ...]  # raw, of every cycle
     window: Window  # where they hold
     warnings: tuple[Finding, ...] = ()  # what the user must know of the window
     holes: tuple[UnrecordedInterval, ...] = ()  # those so large that what they are in has no value

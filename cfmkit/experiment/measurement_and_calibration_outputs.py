@@ -174,7 +174,7 @@ def _add_filtered(raw: Curve, number: int, source: MeasuredCurves) -> Curve:
 
 def cycles_table(report: MeasureReport) -> Table:
     """Return the raw metrics that have a value, one row per cycle."""
-    cycles = report.numbers.each
+    cycles = report.numbers.cycle_metrics
     names = [name for name in cycles[0] if any(item[name].value is not None for item in cycles)]
     numbers = [number_of(curve) or 1 for curve in report.source.raw]
     columns = [

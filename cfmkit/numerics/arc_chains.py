@@ -91,9 +91,9 @@ class ArcChain:
         segment = np.where(flat, turns / 12, (safe - np.sin(safe)) / (8 * np.sin(safe / 2) ** 2))
         return polygon + float(np.sum(chords**2 * segment))
 
-    def append(self, other: ArcChain) -> ArcChain:
-        """Return this chain followed by `other`, whose first node is dropped."""
-        return ArcChain(np.append(self.nodes, other.nodes[1:]), np.append(self.bulges, other.bulges))
+    def append(self, following: ArcChain) -> ArcChain:
+        """Return this chain followed by `following`, whose first node is dropped."""
+        return ArcChain(np.append(self.nodes, following.nodes[1:]), np.append(self.bulges, following.bulges))
 
     def close(self) -> ArcChain:
         """Return the chain with its last node exactly on its first."""

@@ -64,41 +64,41 @@ class DualArray:
     def __neg__(self) -> DualArray:
         return DualArray(-self.value, -self.slopes)
 
-    def __add__(self, other: Any) -> DualArray:
-        if not isinstance(other, DualArray):
-            value = self.value + other
+    def __add__(self, operand: Any) -> DualArray:
+        if not isinstance(operand, DualArray):
+            value = self.value + operand
             return DualArray(value, self.aligned_slopes(value.ndim))
-        value = self.value + other.value
-        return DualArray(value, self.aligned_slopes(value.ndim) + other.aligned_slopes(value.ndim))
+        value = self.value + operand.value
+        return DualArray(value, self.aligned_slopes(value.ndim) + operand.aligned_slopes(value.ndim))
 
     __radd__ = __add__
 
-    def __sub__(self, other: Any) -> DualArray:
-        return self.__add__(-other)
+    def __sub__(self, operand: Any) -> DualArray:
+        return self.__add__(-operand)
 
-    def __rsub__(self, other: Any) -> DualArray:
-        return (-self).__add__(other)
+    def __rsub__(self, operand: Any) -> DualArray:
+        return (-self).__add__(operand)
 
-    def __mul__(self, other: Any) -> DualArray:
-        if not isinstance(other, DualArray):
-            value = self.value * other
-            return DualArray(value, self.aligned_slopes(value.ndim) * other)
-        value = self.value * other.value
-        slopes, others = self.aligned_slopes(value.ndim), other.aligned_slopes(value.ndim)
-        return DualArray(value, slopes * other.value + others * self.value)
+    def __mul__(self, operand: Any) -> DualArray:
+        if not isinstance(operand, DualArray):
+            value = self.value * operand
+            return DualArray(value, self.aligned_slopes(value.ndim) * operand)
+        value = self.value * operand.value
+        slopes, others = self.aligned_slopes(value.ndim), operand.aligned_slopes(value.ndim)
+        return DualArray(value, slopes * operand.value + others * self.value)
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other: Any) -> DualArray:
-        if not isinstance(other, DualArray):
-            value = self.value / other
-            return DualArray(value, self.aligned_slopes(value.ndim) / other)
-        value = self.value / other.value
-        slopes, others = self.aligned_slopes(value.ndim), other.aligned_slopes(value.ndim)
-        return DualArray(value, (slopes - others * value) / other.value)
+    def __truediv__(self, operand: Any) -> DualArray:
+        if not isinstance(operand, DualArray):
+            value = self.value / operand
+            return DualArray(value, self.aligned_slopes(value.ndim) / operand)
+        value = self.value / operand.value
+        slopes, others = self.aligned_slopes(value.ndim), operand.aligned_slopes(value.ndim)
+        return DualArray(value, (slopes - others * value) / operand.value)
 
-    def __rtruediv__(self, other: Any) -> DualArray:
-        value = other / self.value
+    def __rtruediv__(self, operand: Any) -> DualArray:
+        value = operand / self.value
         return DualArray(value, -self.aligned_slopes(value.ndim) * (value / self.value))
 
     def __pow__(self, exponent: int) -> DualArray:

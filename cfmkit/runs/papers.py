@@ -58,7 +58,7 @@ class PrintedRow:
     # `design` asks the specification that it finds, and the analysis of that; `sweep` what is varied
     verb: Literal["analyze", "design", "sweep"] = "analyze"
     ask: tuple[str, ...] = ()  # as many as `printed`, or one that has as many values; empty where nothing is computed
-    here: tuple[str, ...] = ()  # what comes out where that is not what is printed
+    expected: tuple[str, ...] = ()  # what is computed if that is not what is printed
     tolerance: str = ""  # how far off an agreeing number may be; empty: half a unit of its last digit
     heavy: bool = False  # whether it takes long
 
@@ -96,7 +96,7 @@ def rows() -> tuple[PrintedRow, ...]:
 
 def _row_from_entry(paper: str, family: str, entry: Mapping[str, Any]) -> PrintedRow:
     keys: dict[str, Any] = dict(entry)
-    for name in ("printed", "ask", "here"):
+    for name in ("printed", "ask", "expected"):
         keys[name] = _as_texts(keys.get(name, ()))
     return PrintedRow(paper=paper, family=family, changes=_as_texts(keys.pop("set", ())), **keys)
 
@@ -138,7 +138,7 @@ def _check_row(row: PrintedRow) -> ComputedRow:
         values = _compute_values(row)
     except (CfmError, ValueError, KeyError) as error:
         return ComputedRow(row, trouble=f"cannot be computed: {error.args[0] if error.args else error}")
-    shown = tuple(_report_value(value, text) for value, text in zip(values, row.here or row.printed, strict=True))
+    shown = tuple(_report_value(value, text) for value, text in zip(values, row.expected or row.printed, strict=True))
     return ComputedRow(row, shown, "; ".join(_faults_of_verdict(row, values)))
 
 
@@ -164,7 +164,7 @@ def _faults_of_verdict(row: PrintedRow, values: Sequence[float]) -> Iterator[str
             yield f"{_report_value(value, printed)} is not {printed}"
         if row.verdict in ("misprint", "disagrees") and _is_quantity(printed) and _matches(value, printed):
             yield f"{_report_value(value, printed)} is what is printed"
-    for value, expected in zip(values, row.here, strict=bool(row.here)):
+    for value, expected in zip(values, row.expected, strict=bool(row.expected)):
         if not _matches(value, expected):
             yield f"{_report_value(value, expected)} is not {expected}"
 

@@ -83,14 +83,14 @@ class MeshError:
             "curve_error": None if math.isnan(self.between) else self.between,
         }
 
-    def worse(self, other: MeshError) -> MeshError:
+    def worse(self, error: MeshError) -> MeshError:
         """Return the larger of both, each."""
         return MeshError(
-            max(self.force_difference, other.force_difference),
-            max(self.stress_difference, other.stress_difference),
-            max(self.force, other.force),
+            max(self.force_difference, error.force_difference),
+            max(self.stress_difference, error.stress_difference),
+            max(self.force, error.force),
             self.target,
-            float(np.fmax(self.between, other.between)),
+            float(np.fmax(self.between, error.between)),
         )
 
     def too_large(self) -> Iterator[tuple[str, str]]:

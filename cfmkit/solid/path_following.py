@@ -225,16 +225,16 @@ def _add_corner(part: FollowedPart, path: PosePath, event: PathEvent, pose: Bala
     assert event.within is not None
     place, width = event.drive, CORNER_WIDTH * (pose.travel - path.poses[0].travel)
     first, last = (part.pose(at) for at in event.within)
-    if event.near is None:  # the mesh rounds it
+    if event.nearest is None:  # the mesh rounds it
         place, effort, before, behind = _meet(part, path, event, pose)
         unknowns = first.unknowns + (place - first.travel) * first.slope
     else:
-        corner, onto = part.pose(event.near), event.before < event.after
+        corner, onto = part.pose(event.nearest), event.before < event.after
         pose_near, far = (
             (first, pose) if onto else (last, path.poses[-1])
         )  # on the path that crosses, and on the branch
         goal = place + BESIDE_CORNER * (far.travel - place)
-        far = part.pose(find_beside(part, event.near.x, place, part.equilibrium(far), goal, far.unstable))
+        far = part.pose(find_beside(part, event.nearest.x, place, part.equilibrium(far), goal, far.unstable))
         effort, unknowns = corner.effort + (place - corner.travel) * pose_near.stiffness, corner.unknowns
         opening = 2 * (effort - far.effort) / (place - far.travel) - far.stiffness  # of a parabola
         before, behind = (pose_near.stiffness, opening) if onto else (opening, pose_near.stiffness)

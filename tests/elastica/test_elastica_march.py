@@ -255,7 +255,9 @@ def test_several_solutions_and_softest_modes_of_c_and_numpy_are_equal(seed: int,
         np.testing.assert_allclose(mine, its, rtol=0, atol=1e-7 * np.abs(its).max())
     assert (found[0].unstable == found[1].unstable)[good].all()
     vector = np.cos(np.arange(c.n) ** 1.5)
-    flexibilities, modes = zip(*(own.soften(start.x, start.drive, vector, 4) for own in (c, reference)), strict=True)
+    flexibilities, modes = zip(
+        *(own.find_softest(start.x, start.drive, vector, 4) for own in (c, reference)), strict=True
+    )
     assert flexibilities[0] == pytest.approx(flexibilities[1], rel=1e-8)
     assert modes[0] == pytest.approx(modes[1], abs=1e-7 * np.abs(modes[1]).max())
 

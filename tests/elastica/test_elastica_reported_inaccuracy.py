@@ -24,7 +24,7 @@ def strip() -> el.Network:
 def rough(monkeypatch: pytest.MonkeyPatch) -> el.Path:
     """Return a path of one degree that is too low for the tolerance."""
     monkeypatch.setattr(tracing, "MAX_ROUNDS", 1)
-    monkeypatch.setattr(tracing, "_first_degree", lambda *_: 5)
+    monkeypatch.setattr(tracing, "_find_first_degree", lambda *_: 5)
     return el.trace(strip(), BENDING, el.Control(tolerance=1e-10))
 
 

@@ -116,7 +116,7 @@ def test_the_value_of_a_metric_is_its_mean_over_the_cycles_and_repeatability_is_
     numbers = numbers_of(measure_recording(recording(motion, level + motion / 1e3), None), window=Window(0.01, 0.09))
     assert numbers.raw["force_mean[load]"].value == pytest.approx(51.05, abs=1e-6)
     assert numbers.raw["force_repeatability[load]"].value == pytest.approx(1.0, abs=1e-9)
-    assert len(numbers.each) == 3
+    assert len(numbers.cycle_metrics) == 3
 
 
 def test_jitter_leaves_every_metric_defined():

@@ -83,7 +83,7 @@ def test_a_hole_in_one_cycle_of_several_is_avoided_by_choosing_others():
     motion, force = with_hole(9, 18, cycle=1, cycles=3)
     found = report(motion, force)
     assert "of cycle 2" in found.warnings[-1].message
-    assert [item["force_mean[load]"].value is None for item in found.numbers.each] == [False, True, False]
+    assert [item["force_mean[load]"].value is None for item in found.numbers.cycle_metrics] == [False, True, False]
     assert report(motion, force, cycles="3").numbers.raw["force_mean"].value is not None
 
 

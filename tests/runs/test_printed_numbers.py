@@ -68,7 +68,7 @@ def test_every_row_is_whole():
         assert row.why or row.verdict in ("agrees", "arithmetic", "given", "measured there"), row
         assert row.why or not row.tolerance, row
         assert bool(row.ask) or row.verdict in ("measured there", "not modelled"), row
-        assert bool(row.here) == (bool(row.ask) and row.verdict in ("misprint", "disagrees", "measured there")), row
+        assert bool(row.expected) == (bool(row.ask) and row.verdict in ("misprint", "disagrees", "measured there")), row
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,7 @@ from cfmkit.elastica.contact.line_tangent import (
 )
 from cfmkit.elastica.contact.pair_gaps import make_gaps
 from cfmkit.elastica.contact.side_gaps import join_sides, search_sides
-from cfmkit.elastica.contact.terms import gaps, rub_values
+from cfmkit.elastica.contact.terms import gaps, measure_friction
 from cfmkit.elastica.mechanics.elements import smooth_marks
 from cfmkit.elastica.mechanics.energy import line_load
 from cfmkit.elastica.mechanics.march import equations
@@ -98,12 +98,14 @@ class Conditions:
     def all(self) -> tuple[Condition, ...]:
         """The conditions in order: one of each contact of the arrays, by its number, those on sides, on friction."""
         contacts = enumerate(self.mesh.contacts)
-        own = [Condition("force" if k in self.closed else "gap", k, contact.item) for k, contact in contacts]
+        contact_conditions = [
+            Condition("force" if k in self.closed else "gap", k, contact.item) for k, contact in contacts
+        ]
         rubbing = [
             Condition("slip" if state.sense else "grip", k, self.mesh.contacts[k].item)
             for k, state in sorted(self.friction.items()) if state.sense != NO_FRICTION.sense
         ]  # fmt: skip
-        return *own, *self._find_on_sides(), *rubbing
+        return *contact_conditions, *self._list_side_conditions(), *rubbing
 
     def find_row(self, kind: str, item: Contact, last: bool | None = None) -> int:
         """Return the number of the first condition of a kind on a contact, at one end of its beam if so requested."""
@@ -123,7 +125,7 @@ class Conditions:
             rows.setdefault(condition.kind, []).append(row)
         return rows
 
-    def _find_on_sides(self) -> Iterator[Condition]:
+    def _list_side_conditions(self) -> Iterator[Condition]:
         mesh, network = self.mesh, self.mesh.fits.network
         sides: list[tuple[int, Any]] = [(k, contact) for k, contact in enumerate(mesh.contacts) if contact.slide >= 0]
         along = {beam: [contact for _, contact in sides if contact.item.beam == beam] for beam in network.beams}
@@ -163,13 +165,15 @@ class Conditions:
 
     def roots(self, item: BeamSide) -> tuple[bool, ...]:
         """Return which ends of a beam are clamped so that they lie on an obstacle: False the first, True the last."""
-        known, key = self.mesh.fits.known, (Conditions.roots, item)
-        if key not in known:
-            ends = (last for last in (False, True) if isinstance(item, BeamOnObstacle) and self._lies_at(item, last))
-            known[key] = tuple(ends)
-        return known[key]  # type: ignore[no-any-return]
+        cache, key = self.mesh.fits.cache, (Conditions.roots, item)
+        if key not in cache:
+            ends = (
+                last for last in (False, True) if isinstance(item, BeamOnObstacle) and self._lies_at_end(item, last)
+            )
+            cache[key] = tuple(ends)
+        return cache[key]  # type: ignore[no-any-return]
 
-    def _lies_at(self, item: BeamOnObstacle, last: bool) -> bool:
+    def _lies_at_end(self, item: BeamOnObstacle, last: bool) -> bool:
         mesh, network = self.mesh, self.mesh.fits.network
         beam, fitted = network.beams[item.beam], mesh.fits[item.beam]
         name, joint = (beam.end, beam.end_joint) if last else (beam.start, beam.start_joint)
@@ -194,14 +198,15 @@ class Conditions:
             mesh, touched, laid = self.mesh, list[int](), list[int]()
             elements, beam = list_elements(mesh, item.beam), mesh.fits.network.beams[item.beam]
             for number, contact in enumerate(mesh.contacts):
-                other: Any = contact.item
-                if other.name != item.name:
+                contact_item: Any = contact.item
+                if contact_item.name != item.name:
                     continue
-                if contact.slide >= 0 and other.beam == item.beam:
+                if contact.slide >= 0 and contact_item.beam == item.beam:
                     touched += [contact.element, contact.element + 1]
-                elif isinstance(other, NodeOnObstacle | NodeOnBeam) and number in self.closed:
-                    touched += [elements[0]] * (other.node == beam.start) + [elements[-1]] * (other.node == beam.end)
-                if contact.laid and other is item:
+                elif isinstance(contact_item, NodeOnObstacle | NodeOnBeam) and number in self.closed:
+                    touched += [elements[0]] * (contact_item.node == beam.start)
+                    touched += [elements[-1]] * (contact_item.node == beam.end)
+                if contact.laid and contact_item is item:
                     laid.append(contact.element + (contact.laid > 0))
             touched += [elements[-1] if last else elements[0] for last in self.roots(item)]
             self._gaps[item] = make_gaps(mesh, item, tuple(touched), tuple(laid))
@@ -229,14 +234,14 @@ class Conditions:
         """Return the values of all conditions in n states (n, size), (rows, n)."""
         rows, sides = self._touching
         together = None if sides is None else search_sides(self.mesh, sides, z, stage, watch=True)
-        known = {} if together is None else dict(zip(rows, together[:, :, 0].T, strict=True))
+        values_by_row = {} if together is None else dict(zip(rows, together[:, :, 0].T, strict=True))
         measured = self._equations.measure_nodes(z)
         if measured is not None:
             open_gaps = self.rows_of("gap")
-            known |= {k: measured[k] + raise_pad(self.mesh, self.mesh.contacts[k], z) for k in open_gaps}
+            values_by_row |= {k: measured[k] + raise_pad(self.mesh, self.mesh.contacts[k], z) for k in open_gaps}
         values = np.empty((len(self.all), len(z)))
         for row, condition in enumerate(self.all):
-            values[row] = known[row] if row in known else self.value(condition, z, stage)
+            values[row] = values_by_row[row] if row in values_by_row else self.value(condition, z, stage)
         return values
 
     @cached_property
@@ -262,7 +267,7 @@ class Conditions:
         return np.asarray(gaps(self.mesh, contact, z) + raise_pad(self.mesh, contact, z))
 
     def _measure_friction(self, condition: Condition, z: FloatArray, _stage: LoadStage) -> FloatArray:
-        return rub_values(self.mesh, self.mesh.contacts[condition.number], self.friction[condition.number], z)
+        return measure_friction(self.mesh, self.mesh.contacts[condition.number], self.friction[condition.number], z)
 
     def _measure_least_gap(self, condition: Condition, z: FloatArray, stage: LoadStage) -> FloatArray:
         return self.gaps_of(condition.item).least(z, stage, watch=True)
@@ -271,15 +276,15 @@ class Conditions:
         contact, following = self.mesh.contacts[condition.number : condition.number + 2]
         return np.asarray(z[:, following.slide] - z[:, contact.slide] - NEW_PLACE)
 
-    def _measure_way_to_end(self, condition: Condition, z: FloatArray, _stage: LoadStage) -> FloatArray:
-        way = condition.mark - z[:, self.mesh.contacts[condition.number].slide]
-        return np.asarray((way if condition.last else -way) - 0.5 * NEW_PLACE)
+    def _measure_distance_to_end(self, condition: Condition, z: FloatArray, _stage: LoadStage) -> FloatArray:
+        distance = condition.mark - z[:, self.mesh.contacts[condition.number].slide]
+        return np.asarray((distance if condition.last else -distance) - 0.5 * NEW_PLACE)
 
     def _measure_pull(self, condition: Condition, z: FloatArray, _stage: LoadStage) -> FloatArray:
         """Return the tension along a round obstacle, positive if it presses the side on."""
         mesh, contact = self.mesh, self.mesh.contacts[condition.number]
         element = contact.element + (contact.laid > 0)
-        bulge = condition.item.outline.distance(_body_place(mesh, contact, z) * mesh.scales.length).curvature
+        bulge = condition.item.outline.distance(_find_body_place(mesh, contact, z) * mesh.scales.length).curvature
         return np.asarray(np.sign(bulge) * z[:, mesh.elements.unknowns[element, -2]])
 
     def _measure_root_curvature(self, condition: Condition, z: FloatArray, _stage: LoadStage) -> FloatArray:
@@ -288,7 +293,7 @@ class Conditions:
         end = find_end(mesh, item.beam, condition.last, z)
         unloaded = measure_unloaded_curvature(mesh, item.beam, np.array([float(side)]), end.element)
         edge = measure_distance(mesh, item, step_inwards(item, end.place, end.angle, condition.last), z)
-        return _gap_curvature(measure_bend(mesh, z, end.element, side) + unloaded, end.angle, edge)
+        return _measure_gap_curvature(measure_bend(mesh, z, end.element, side) + unloaded, end.angle, edge)
 
     def _measure_leaving(self, condition: Condition, z: FloatArray, stage: LoadStage) -> FloatArray:
         """Return how much the side of a beam runs away from the obstacle from a pad at its end."""
@@ -315,16 +320,16 @@ class Conditions:
     def _measure_spread(self, condition: Condition, z: FloatArray, _stage: LoadStage) -> FloatArray:
         """Return the curvature of the gap at a contact; of two beams the smaller one of the gap by both places."""
         mesh, contact = self.mesh, self.mesh.contacts[condition.number]
-        own = self._relative_curvature(contact, z)
+        curvature = self._measure_relative_curvature(contact, z)
         if not isinstance(condition.item, BeamOnBeam):
-            return own
+            return curvature
         mate = find_mate(mesh, condition.item)
-        other = self._relative_curvature(mate, z)
-        apart = _body_place(mesh, contact, z) - _body_place(mesh, mate, z)
+        mate_curvature = self._measure_relative_curvature(mate, z)
+        apart = _find_body_place(mesh, contact, z) - _find_body_place(mesh, mate, z)
         mixed = 1 / np.hypot(*apart.T)  # but for its sign: both are tangent
-        return np.asarray(0.5 * (own + other) - np.hypot(0.5 * (own - other), mixed))
+        return np.asarray(0.5 * (curvature + mate_curvature) - np.hypot(0.5 * (curvature - mate_curvature), mixed))
 
-    def _relative_curvature(self, contact: ContactAt, z: FloatArray) -> FloatArray:
+    def _measure_relative_curvature(self, contact: ContactAt, z: FloatArray) -> FloatArray:
         """Return the curvature of the gap along a beam at a contact."""
         mesh, item = self.mesh, contact.item
         curvatures = equations(mesh).measure_curvatures(z)
@@ -335,15 +340,15 @@ class Conditions:
         parameter, inside = z[:, contact.slide], float(mesh.elements.cuts[contact.element].mean())
         angle = np.real(mesh.fits[beam].angle(parameter, inside)) + z[:, mesh.attachments.unknowns[contact.place, 2]]
         bend = 0.5 * both + measure_unloaded_curvature(mesh, beam, parameter, contact.element)
-        return _gap_curvature(bend, angle, measure_distance(mesh, item, _body_place(mesh, contact, z), z))  # type: ignore[arg-type]
+        return _measure_gap_curvature(bend, angle, measure_distance(mesh, item, _find_body_place(mesh, contact, z), z))  # type: ignore[arg-type]
 
 
-def _body_place(mesh: Discretisation, contact: ContactAt, z: FloatArray) -> Any:
+def _find_body_place(mesh: Discretisation, contact: ContactAt, z: FloatArray) -> Any:
     """Return where the body at a contact of a side is in n states, (n, 2)."""
     return mesh.attachments.origin[contact.place] + z[:, mesh.attachments.unknowns[contact.place, :2]]
 
 
-def _gap_curvature(bend: Any, angle: Any, edge: Distance) -> FloatArray:
+def _measure_gap_curvature(bend: Any, angle: Any, edge: Distance) -> FloatArray:
     """Return the curvature of the gap along a beam of a curvature and an angle, tangent to an edge."""
     rises = edge.normal[:, 1] * np.cos(angle) - edge.normal[:, 0] * np.sin(angle)
     return np.asarray(bend * rises + edge.curvature * rises**2)
@@ -356,7 +361,7 @@ _MEASURE_KIND = {
     "slip": Conditions._measure_friction,
     "touch": Conditions._measure_least_gap,
     "tangent": Conditions._measure_leaving,
-    "end": Conditions._measure_way_to_end,
+    "end": Conditions._measure_distance_to_end,
     "spreads": Conditions._measure_spread,
     "closes": Conditions._measure_distance,
     "pinch": Conditions._measure_distance,

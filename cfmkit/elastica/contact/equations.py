@@ -120,11 +120,11 @@ class EquationsWithNodes(NumpyEquations):
 class ContactEquations(EquationsWithNodes):
     """Equations of a network with pads and stops of nodes for its free unknowns."""
 
-    def gradient(self, free: Any, way: Any) -> Any:
+    def gradient(self, free: Any, place: Any) -> Any:
         """Return the gradient by all unknowns, (size,)."""
-        if np.iscomplexobj(free) or np.iscomplexobj(way) or self.ramp:
-            return super().gradient(free, way)
-        return self.gradients(np.asarray(self.values(free, way))[None], np.array([way], float))[0]
+        if np.iscomplexobj(free) or np.iscomplexobj(place) or self.ramp:
+            return super().gradient(free, place)
+        return self.gradients(np.asarray(self.values(free, place))[None], np.array([place], float))[0]
 
     def gradients(self, z: FloatArray, drive: FloatArray) -> FloatArray:
         """Return the gradients by all unknowns of states (p, size), (p, size)."""
@@ -135,8 +135,8 @@ class ContactEquations(EquationsWithNodes):
                 whole_gradients[number, term.unknowns] += term.gradient
         return whole_gradients
 
-    def linearise(self, free: FloatArray, way: float) -> LinearEquations:
+    def linearise(self, free: FloatArray, place: float) -> LinearEquations:
         """Return the equations linearised at some unknowns."""
-        at = self.place_among_all(self.plain.linearise(free[: self.plain.n], way))
-        self.add_nodes(np.asarray(self.values(free, way)), at)
+        at = self.place_among_all(self.plain.linearise(free[: self.plain.n], place))
+        self.add_nodes(np.asarray(self.values(free, place)), at)
         return at

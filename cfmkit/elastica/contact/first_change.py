@@ -39,8 +39,8 @@ def find_change_before_end(
     if previous is None or stop.end in (WhyStopped.COMPLETE, WhyStopped.FULL) or stop.drive == previous.drive:
         return None
     start = piece.shrink(previous)
-    last = correct(piece.own, start.x + (stop.drive - start.drive) * start.rate, stop.drive)
-    if last is None or largest_motion(piece.own, last.x - start.x) > piece.options.largest_motion:
+    last = correct(piece.own_problem, start.x + (stop.drive - start.drive) * start.rate, stop.drive)
+    if last is None or largest_motion(piece.own_problem, last.x - start.x) > piece.options.largest_motion:
         return None
     return find_change(piece, previous, piece.grow(last))
 
@@ -60,16 +60,16 @@ def find_change(piece: PieceOfPath, first: PathEquilibrium, last: PathEquilibriu
     changes = [change for change in located.values() if isinstance(change, ContactChange)]
     # a contact that parts, or moves, brings the side beside it into the obstacle: nothing else touches by that
     for row in beside:
-        values_there = [piece.row_value(change.at, row) for change in changes if change.piece is None]
+        values_there = [piece.measure_condition(change.at, row) for change in changes if change.piece is None]
         if not changes or min(values_there, default=0.0) < -step.roundings[row]:
             located[row] = _locate(piece, step, row)
     changes = [change for change in located.values() if isinstance(change, ContactChange)]
     if not changes:
         missing = next(iter(located))
-        what, names = ("ends" if missing in piece.closed else "begins"), piece.say(missing)
+        what, names = ("ends" if missing in piece.closed else "begins"), piece.name_contact(missing)
         lost = PathStop(WhyStopped.LOST, first.drive, NOT_LOCATED.format(names=names, what=what))
         return next((stop for stop in located.values() if isinstance(stop, PathStop)), lost)
-    return min(changes, key=lambda change: step.share_of(change.at, change.piece))
+    return min(changes, key=lambda change: step.find_share(change.at, change.piece))
 
 
 def _is_beside_change(piece: PieceOfPath, row: int, rows: list[int]) -> bool:
@@ -109,7 +109,7 @@ def _solve_change(piece: PieceOfPath, step: StepBetween, row: int) -> PathEquili
     if share is None:
         return None
     guess, both = step.guess(share), piece.with_closed(piece.closed | {row})
-    state = both.solve_at_level(guess, {both.slot_in_own(row): 1.0}, 0.0)
+    state = both.solve_at_level(guess, {both.find_own_slot(row): 1.0}, 0.0)
     if state is None:
         return None
     free = both.expand_state(state.x)

@@ -59,14 +59,14 @@ def choose_friction(
 ) -> BeyondChange | None:
     """Return the first combination of states of friction that can go on from an equilibrium; None if none can."""
     numbers = piece.rubbing
-    choices = [[piece.friction[k]] if k == settled else list(_continuations(piece, at, k, turns)) for k in numbers]
+    choices = [[piece.friction[k]] if k == settled else list(_list_continuations(piece, at, k, turns)) for k in numbers]
     several = [k for k, states in enumerate(choices) if len(states) > 1]
     for k in several[MAX_TOGETHER:]:
         del choices[k][1:]
     tried = []
     for states in itertools.product(*choices):
         beyond = replace(piece, friction=dict(zip(numbers, states, strict=True)))
-        start = _start_loose(beyond, at)
+        start = _find_loose_start(beyond, at)
         if start is not None:
             tried.append((beyond, start))
     for sense in senses:
@@ -76,13 +76,13 @@ def choose_friction(
     return None
 
 
-def _start_loose(piece: PieceOfPath, at: PathEquilibrium) -> PathEquilibrium | None:
+def _find_loose_start(piece: PieceOfPath, at: PathEquilibrium) -> PathEquilibrium | None:
     """Return the start of a piece; None if there is none, or its contacts leave no way to move with the drive."""
     start = piece.solve_near(at)
     return start if start is not None and np.abs(start.rate).max(initial=0.0) < RIGID_RATE else None
 
 
-def _continuations(piece: PieceOfPath, at: PathEquilibrium, number: int, turns: bool) -> Iterator[FrictionState]:
+def _list_continuations(piece: PieceOfPath, at: PathEquilibrium, number: int, turns: bool) -> Iterator[FrictionState]:
     """Yield the states in which the friction of a closed contact may go on, the likelier ones first."""
     contact, before = piece.whole.mesh.contacts[number], piece.friction.get(number, NO_FRICTION)
     z = piece.whole.values(at.x, at.drive)
@@ -93,7 +93,7 @@ def _continuations(piece: PieceOfPath, at: PathEquilibrium, number: int, turns: 
             yield FrictionState(-float(np.sign(rub)))
     elif before.sense == NO_FRICTION.sense:
         yield piece.stick_at(at, number)
-        if limit <= piece.roundings_of_force(at):
+        if limit <= piece.estimate_force_rounding(at):
             yield from (FrictionState(1.0), FrictionState(-1.0))
     else:
         sticks = piece.stick_at(at, number)
@@ -102,22 +102,24 @@ def _continuations(piece: PieceOfPath, at: PathEquilibrium, number: int, turns: 
 
 def _goes_on(piece: PieceOfPath, at: PathEquilibrium, sense: float, changed: int | None) -> bool:
     """Return True if no force, no gap and no way of slip of a contact at its limit goes the wrong way."""
-    rates = list(_margin_rates(piece, at, sense, changed))
+    rates = list(_measure_margin_rates(piece, at, sense, changed))
     if any(rate < -UNDECIDED_RATE_RTOL for rate in rates):
         return False
-    return all(rate > UNDECIDED_RATE_RTOL for rate in rates) or _steps_on(piece, at, sense)
+    return all(rate > UNDECIDED_RATE_RTOL for rate in rates) or _can_step_on(piece, at, sense)
 
 
-def _margin_rates(piece: PieceOfPath, at: PathEquilibrium, sense: float, changed: int | None) -> Iterator[float]:
+def _measure_margin_rates(
+    piece: PieceOfPath, at: PathEquilibrium, sense: float, changed: int | None
+) -> Iterator[float]:
     """Yield how the conditions change that are just met, each as a share of the largest rate."""
-    mesh, z, moved = piece.whole.mesh, piece.whole.values(at.x, at.drive), sense * piece.moved_by_drive(at)
-    largest, rounding = float(np.abs(moved).max()), piece.roundings_of_force(at)
+    mesh, z, moved = piece.whole.mesh, piece.whole.values(at.x, at.drive), sense * piece.measure_rates(at)
+    largest, rounding = float(np.abs(moved).max()), piece.estimate_force_rounding(at)
     if changed is not None:
-        yield sense * piece.grows_along(at, changed) / largest
+        yield sense * piece.measure_growth(at, changed) / largest
     for number, state in piece.friction.items():
         contact = mesh.contacts[number]
         if state.sense:
-            yield sense * piece.slip_rate(at, number) / largest
+            yield sense * piece.measure_slip_rate(at, number) / largest
             continue
         limit, rub = contact.item.friction * float(z[contact.unknown]), float(z[contact.rub])
         if abs(rub) < (1 - AT_LIMIT) * limit - rounding:
@@ -127,10 +129,10 @@ def _margin_rates(piece: PieceOfPath, at: PathEquilibrium, sense: float, changed
         yield (contact.item.friction * float(moved[contact.unknown]) - excess) / largest
 
 
-def _steps_on(piece: PieceOfPath, at: PathEquilibrium, sense: float) -> bool:
+def _can_step_on(piece: PieceOfPath, at: PathEquilibrium, sense: float) -> bool:
     """Return True if all conditions are met a small step further on."""
     start, step = piece.shrink(at), sense * TRIAL_STEP_FRACTION * piece.options.span
-    new = piece.own.solve(start.x + step * start.rate, start.drive + step)
+    new = piece.own_problem.solve(start.x + step * start.rate, start.drive + step)
     if new is None:
         return False
     grown = piece.grow(new)
@@ -174,7 +176,7 @@ def follow_in_contact(
     if any(contact.rub >= 0 for contact in problem.mesh.contacts) and not problem.ramp:
         part = part.stick_all(start)  # constant loads have come on without friction
         start = part.grow(part.shrink(start))
-    yield from limit_points(_follow(part, start, targets, branch), options.most_points)
+    yield from limit_points(_follow_pieces(part, start, targets, branch), options.most_points)
 
 
 def _find_turns(problem: NetworkProblem, start: float, targets: FloatArray) -> list[int]:
@@ -187,34 +189,35 @@ def _find_turns(problem: NetworkProblem, start: float, targets: FloatArray) -> l
     return [*turns.tolist(), len(targets)]
 
 
-def _follow(
+def _follow_pieces(
     part: PieceOfPath, start: PathEquilibrium, targets: FloatArray, branch: PathBranch | None
 ) -> Iterator[PathItem]:
+    """Yield the items of a path piece by piece, with the changes of contacts between."""
     options, turns = part.options, _find_turns(part.whole, start.drive, targets)
     first = targets[: turns[0]]
-    items = follow(part.own, part.shrink(start), first, options, branch)
-    walk, count, place = Walk(part.own, options, first, start, 0.0, branch=branch), 0, np.inf
+    items = follow(part.own_problem, part.shrink(start), first, options, branch)
+    walk, count, place = Walk(part.own_problem, options, first, start, 0.0, branch=branch), 0, np.inf
     previous: PathEquilibrium | None = None
     while True:
-        outcome = yield from _follow_part(part, items, walk, previous)
+        outcome = yield from _follow_to_change(part, items, walk, previous)
         if isinstance(outcome, EndOfPiece) and outcome.stop.end is WhyStopped.COMPLETE and turns[1:]:
             at, sense = outcome.at, float(np.sign(targets[turns[0]] - outcome.at.drive))
             chosen = choose_friction(part, at, (sense,), turns=True)
             if chosen is None:
-                yield PathStop(WhyStopped.LOST, at.drive, NO_FRICTION_STATE.format(names=part.say_rubbing()))
+                yield PathStop(WhyStopped.LOST, at.drive, NO_FRICTION_STATE.format(names=part.name_rubbing_contacts()))
                 return
             yield from _change_friction(chosen, part.friction, at)
             step = options.first_step * options.span
             walk = outcome.walk._replace(targets=targets[: turns[1]], number=turns[0], step=step)
             part, previous, turns = chosen.piece, chosen.at, turns[1:]
-            items, count = _go_on(part, walk, chosen.at, sense), 0
+            items, count = _follow_next_piece(part, walk, chosen.at, sense), 0
             continue
         if isinstance(outcome, EndOfPiece):
             yield outcome.stop
             return
         walk, change, sense = outcome
-        near = abs(change.at.drive - place) <= SAME_PLACE * options.span
-        count, place = (count + 1 if near else 0), change.at.drive
+        is_same_place = abs(change.at.drive - place) <= SAME_PLACE * options.span
+        count, place = (count + 1 if is_same_place else 0), change.at.drive
         if count > MAX_CHANGES_AT_ONE_PLACE:
             yield PathStop(WhyStopped.LOST, place, "contacts begin and end without end at {place}")
             return
@@ -240,14 +243,14 @@ def _follow(
             yield PathEvent("limit point", place, change.before, at.unstable, at)
         walk = yield from _deliver_before(part, walk, place, at)
         items, previous = (
-            iter([PathStop(WhyStopped.COMPLETE, place)]) if walk.done else _go_on(part, walk, at, sense),
+            iter([PathStop(WhyStopped.COMPLETE, place)]) if walk.done else _follow_next_piece(part, walk, at, sense),
             at,
         )
 
 
 def _stop_at_change(end: WhyStopped, message: str, changed: PieceOfPath, change: ContactChange) -> PathStop:
     """Return the end of a path at a change of a contact."""
-    text = message.format(names=changed.say(change.number), what=change.kind)
+    text = message.format(names=changed.name_contact(change.number), what=change.kind)
     return PathStop(end, change.at.drive, text)
 
 
@@ -266,7 +269,7 @@ def _deliver_before(part: PieceOfPath, walk: Walk, place: float, at: PathEquilib
     """Yield what is requested between a change and the first place of a contact that moves or parts."""
     low, high = sorted((place, at.drive))
     while not walk.done and low != high and low <= walk.targets[walk.number] <= high:
-        reached = part.own.solve(part.shrink(at).x, float(walk.targets[walk.number]))
+        reached = part.own_problem.solve(part.shrink(at).x, float(walk.targets[walk.number]))
         if reached is None:
             break
         yield Point(part.grow(reached), walk.number, walk.branch)
@@ -274,17 +277,19 @@ def _deliver_before(part: PieceOfPath, walk: Walk, place: float, at: PathEquilib
     return walk
 
 
-def _go_on(part: PieceOfPath, walk: Walk, at: PathEquilibrium, sense: float) -> Iterator[Point | PathEvent | PathStop]:
+def _follow_next_piece(
+    part: PieceOfPath, walk: Walk, at: PathEquilibrium, sense: float
+) -> Iterator[Point | PathEvent | PathStop]:
     """Yield the items of the next piece: by the drive, or by the arc length where it leads away from the next value."""
-    own, options = part.own, walk.options
+    problem, options = part.own_problem, walk.options
     start, step = part.shrink(at), max(walk.step, SHORTEST_STEP * options.span)
-    walk = Walk(own, options, walk.targets, start, step, walk.number, trail=(start,), branch=walk.branch)
+    walk = Walk(problem, options, walk.targets, start, step, walk.number, trail=(start,), branch=walk.branch)
     if sense == walk.sense:
         yield from each_point(follow_on(walk))
         return
-    tangent = unit_tangent(own, start, sense * np.append(start.rate, 1.0), options.span)
+    tangent = unit_tangent(problem, start, sense * np.append(start.rate, 1.0), options.span)
     length = float(FIRST_ARC * step / max(abs(tangent[-1]), SHORTEST_STEP))
-    move = next(follow_arc(own, start, tangent, min(length, options.largest_motion), options), None)
+    move = next(follow_arc(problem, start, tangent, min(length, options.largest_motion), options), None)
     if move is None:
         yield PathStop(WhyStopped.LOST, start.drive, "no step converged at {place}")
         return
@@ -295,7 +300,7 @@ def _go_on(part: PieceOfPath, walk: Walk, at: PathEquilibrium, sense: float) -> 
         yield outcome
 
 
-def _follow_part(
+def _follow_to_change(
     part: PieceOfPath, items: Iterator[Point | PathEvent | PathStop], walk: Walk, previous: PathEquilibrium | None
 ) -> Generator[Point | PathEvent | ContactChange | Remeshed, None, EndOfPiece | tuple[Walk, ContactChange, float]]:
     """Yield the items of a piece up to a change; return the walk there, the change and the sense of travel.
@@ -309,37 +314,37 @@ def _follow_part(
             waiting.append(part.grow_event(item))
             continue
         if isinstance(item, PathStop):
-            found = find_change_before_end(part, previous, item)
-            if found is None:
+            change = find_change_before_end(part, previous, item)
+            if change is None:
                 yield from waiting
-                return EndOfPiece(item, _pass_point(walk, last), previous or walk.here)
+                return EndOfPiece(item, _pass_point(walk, last), previous or walk.current)
             at, step = None, item.drive
         else:
-            (at, is_quiet), step = part.own.grow_watched(item.at), item.at.drive
-            found = None if is_quiet or previous is None else find_change(part, previous, at)
-        if found is not None:
+            (at, is_quiet), step = part.own_problem.grow_watched(item.at), item.at.drive
+            change = None if is_quiet or previous is None else find_change(part, previous, at)
+        if change is not None:
             assert previous is not None
             walk = _pass_point(walk, last)
-            if isinstance(found, PathStop):
+            if isinstance(change, PathStop):
                 lost = next((event for event in waiting if event.after > event.before), None)
                 if lost is None:
-                    return EndOfPiece(found, walk, previous)
+                    return EndOfPiece(change, walk, previous)
                 yield from waiting  # the way on from there goes through an obstacle
                 return EndOfPiece(PathStop(WhyStopped.JUMPS, lost.drive, BUCKLES_AWAY), walk, previous)
             sense = 1.0 if step >= previous.drive else -1.0
-            place = found.at.drive
+            place = change.at.drive
             yield from (event for event in waiting if (place - event.drive) * sense > 0)
             walk = walk._replace(step=abs(step - previous.drive))
             tied = SAME_PLACE * walk.options.span
-            beside = abs(place - previous.drive) <= tied and found.piece is None
-            if found.piece is not None and found.piece.whole.mesh is not mesh:
-                yield Remeshed(found.piece.whole)
+            beside = abs(place - previous.drive) <= tied and change.piece is None
+            if change.piece is not None and change.piece.whole.mesh is not mesh:
+                yield Remeshed(change.piece.whole)
             if not walk.done and abs(walk.targets[walk.number] - place) <= tied and not beside:
-                yield Point(found.at, walk.number, walk.branch)
+                yield Point(change.at, walk.number, walk.branch)
                 walk = walk._replace(number=walk.number + 1)
             elif not beside:
-                yield Point(found.at, -1, walk.branch)
-            return walk, found, sense
+                yield Point(change.at, -1, walk.branch)
+            return walk, change, sense
         yield from waiting
         waiting = []
         assert isinstance(item, Point)
@@ -351,7 +356,7 @@ def _follow_part(
         last = item if item.target >= 0 or last is None else item._replace(target=last.target)
         previous = at
     walk = _pass_point(walk, last)
-    return EndOfPiece(PathStop(WhyStopped.LOST, walk.here.drive, "no step converged at {place}"), walk, walk.here)
+    return EndOfPiece(PathStop(WhyStopped.LOST, walk.current.drive, "no step converged at {place}"), walk, walk.current)
 
 
 def _pass_point(walk: Walk, point: Point | None) -> Walk:
@@ -379,24 +384,24 @@ def _enter(part: PieceOfPath, change: ContactChange, sense: float) -> PathStop |
     beyond = part.with_closed(part.closed | {number} if begins else part.closed - {number})
     if not part.whole.ramp and beyond.rubbing:
         return _enter_friction(beyond, change, sense, number)
-    at, place = _start_loose(beyond, change.at), change.at.drive
+    at, place = _find_loose_start(beyond, change.at), change.at.drive
     if at is None and begins:
-        return PathStop(WhyStopped.BLOCKED, place, BLOCKED_MESSAGE.format(names=beyond.say_all(number)))
+        return PathStop(WhyStopped.BLOCKED, place, BLOCKED_MESSAGE.format(names=beyond.name_contacts(number)))
     if at is None:
-        message = STABILITY_LOSS_MESSAGE.format(names=beyond.say(number), what="ends")
+        message = STABILITY_LOSS_MESSAGE.format(names=beyond.name_contact(number), what="ends")
         return PathStop(WhyStopped.JUMPS, place, message)
-    return BeyondChange(beyond, at, -sense if beyond.grows_along(at, number) * sense < 0 else sense)
+    return BeyondChange(beyond, at, -sense if beyond.measure_growth(at, number) * sense < 0 else sense)
 
 
 def _enter_friction(
     beyond: PieceOfPath, change: ContactChange, sense: float, changed: int | None
 ) -> PathStop | BeyondChange:
-    """Return the same where a closed contact has friction."""
+    """Return the piece behind a change, its start and the sense of the drive where a closed contact has friction."""
     settled = change.number if changed is None else None
     chosen = choose_friction(beyond, change.at, (sense, -sense), changed, settled)
     if chosen is not None:
         return chosen
-    if _start_loose(beyond.stick_all(change.at), change.at) is None:
-        message = BLOCKED_MESSAGE.format(names=beyond.say_all(change.number))
+    if _find_loose_start(beyond.stick_all(change.at), change.at) is None:
+        message = BLOCKED_MESSAGE.format(names=beyond.name_contacts(change.number))
         return PathStop(WhyStopped.BLOCKED, change.at.drive, message)
-    return PathStop(WhyStopped.LOST, change.at.drive, NO_FRICTION_STATE.format(names=beyond.say_rubbing()))
+    return PathStop(WhyStopped.LOST, change.at.drive, NO_FRICTION_STATE.format(names=beyond.name_rubbing_contacts()))

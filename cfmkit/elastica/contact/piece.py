@@ -17,7 +17,7 @@ from cfmkit.elastica.contact.carried_states import carry
 from cfmkit.elastica.contact.conditions import FORCE_ROUNDING, Conditions
 from cfmkit.elastica.contact.equations import with_closed
 from cfmkit.elastica.contact.side_gaps import LoadStage
-from cfmkit.elastica.contact.terms import measure, slip_way
+from cfmkit.elastica.contact.terms import measure, measure_slip
 from cfmkit.elastica.mechanics.discretise import ContactAt, Discretisation, FlankPlace
 from cfmkit.elastica.mechanics.problem import NetworkProblem
 from cfmkit.elastica.model.contact import BeamOnBeam, FrictionState, NodeOnBeam, NodeOnObstacle, describe
@@ -48,7 +48,7 @@ class PieceOfPath:
     seen_between: dict[tuple[float, float], FloatArray] = field(init=False, default_factory=dict)  # values by drives
 
     @cached_property
-    def own(self) -> WatchedProblem:
+    def own_problem(self) -> WatchedProblem:
         """The problem whose contacts neither begin nor end."""
         assert self.whole.equations is not None  # from which those of the piece are made
         mesh = with_closed(self.whole.mesh, self.closed, self.friction)
@@ -69,7 +69,7 @@ class PieceOfPath:
             if contact.slide >= 0
         )
 
-    def sides_of(self, beam: str) -> list[int]:
+    def list_sides(self, beam: str) -> list[int]:
         """Return the numbers in the arrays of the contacts of the side of a beam, in order along it."""
         sides: Any = [(k, contact) for k, contact in enumerate(self.whole.mesh.contacts) if contact.slide >= 0]
         return [k for k, contact in sides if contact.item.beam == beam]
@@ -119,28 +119,28 @@ class PieceOfPath:
             self.siblings[closed] = PieceOfPath(self.whole, closed, self.options, siblings=self.siblings)
         return self.siblings[closed]
 
-    def say(self, row: int) -> str:
-        """Return what the contact of a row of `values` is called: of a contact its number is its row."""
+    def name_contact(self, row: int) -> str:
+        """Return the name of the contact of a row of `values` in messages: of a contact its number is its row."""
         return describe(self.conditions.all[row].item)
 
-    def say_all(self, number: int) -> str:
-        """Return what a contact and those that are closed with it are called, where they block the drive together."""
-        others = [self.say(index) for index in sorted(self.closed - {number})]
-        return " with ".join([self.say(number), *others[:2]])
+    def name_contacts(self, number: int) -> str:
+        """Return the names of a contact and of those that block the drive together with it."""
+        others = [self.name_contact(index) for index in sorted(self.closed - {number})]
+        return " with ".join([self.name_contact(number), *others[:2]])
 
     @property
     def rubbing(self) -> list[int]:
         """Closed contacts with friction."""
         return [k for k in sorted(self.closed) if self.whole.mesh.contacts[k].rub >= 0]
 
-    def say_rubbing(self) -> str:
-        """Return what the closed contacts with friction are called."""
-        return ", ".join(map(self.say, self.rubbing))
+    def name_rubbing_contacts(self) -> str:
+        """Return the names of the closed contacts with friction."""
+        return ", ".join(map(self.name_contact, self.rubbing))
 
     def stick_at(self, at: PathEquilibrium, number: int) -> FrictionState:
         """Return the state of friction of a contact that begins to stick at an equilibrium."""
-        way = slip_way(self.whole.mesh, self.whole.mesh.contacts[number], self.whole.values(at.x, at.drive))
-        return FrictionState(0.0, float(way.value))
+        slip = measure_slip(self.whole.mesh, self.whole.mesh.contacts[number], self.whole.values(at.x, at.drive))
+        return FrictionState(0.0, float(slip.value))
 
     def stick_all(self, at: PathEquilibrium) -> PieceOfPath:
         """Return the piece in which all closed contacts with friction stick from an equilibrium on."""
@@ -151,7 +151,7 @@ class PieceOfPath:
     def own_mask(self) -> Any:
         """Which free unknowns of the whole are those of the own problem."""
         mask = np.zeros(len(self.whole.mesh.free), bool)
-        mask[np.searchsorted(self.whole.mesh.free, self.own.mesh.free)] = True
+        mask[np.searchsorted(self.whole.mesh.free, self.own_problem.mesh.free)] = True
         return mask
 
     def shrink(self, at: PathEquilibrium) -> PathEquilibrium:
@@ -182,7 +182,7 @@ class PieceOfPath:
         return at._replace(x=self.expand_state(at.x), rate=self.expand(at.rate))
 
     def grow_each(self, states: Sequence[PathEquilibrium]) -> list[PathEquilibrium]:
-        """Return what `grow` does of several equilibria."""
+        """Return equilibria with the forces of all contacts."""
         x, rate = np.zeros((2, len(states), len(self.own_mask)))
         x[:, self.own_mask], rate[:, self.own_mask] = [at.x for at in states], [at.rate for at in states]
         x += self._kept
@@ -191,22 +191,22 @@ class PieceOfPath:
     def grow_event(self, event: PathEvent) -> PathEvent:
         """Return an event whose equilibria have the forces of all contacts."""
         within = None if event.within is None else (self.grow(event.within[0]), self.grow(event.within[1]))
-        near = None if event.near is None else self.grow(event.near)
+        nearest = None if event.nearest is None else self.grow(event.nearest)
         modes = None if event.modes is None else self.expand(event.modes)
-        return replace(event, near=near, modes=modes, within=within)
+        return replace(event, nearest=nearest, modes=modes, within=within)
 
     def solve_near(self, at: PathEquilibrium) -> PathEquilibrium | None:
         """Return the equilibrium of this piece at the drive of one near it; both have the unknowns of all contacts."""
-        near = self.shrink(at)
-        found = self.own.solve(near.x, near.drive)
-        return None if found is None else self.grow(found)
+        guess = self.shrink(at)
+        solution = self.own_problem.solve(guess.x, guess.drive)
+        return None if solution is None else self.grow(solution)
 
     def solve_at_level(self, begin: PathEquilibrium, row: dict[int, float], level: float) -> PathEquilibrium | None:
         """Return the equilibrium at which a combination of its own unknowns has a value, near one of all unknowns."""
-        near = self.shrink(begin)
-        border = np.zeros(len(near.x) + 1)
+        guess = self.shrink(begin)
+        border = np.zeros(len(guess.x) + 1)
         border[list(row)] = list(row.values())
-        state = self.own.solve(near.x, near.drive, Border(border, level))
+        state = self.own_problem.solve(guess.x, guess.drive, Border(border, level))
         return state if state is not None and np.isfinite(state.rate).all() else None
 
     def is_locked(self, before: PathEquilibrium, at: PathEquilibrium) -> bool:
@@ -218,30 +218,30 @@ class PieceOfPath:
     # -- gaps and forces -----------------------------------------------------------------------------------------------
     def values(self, x: FloatArray, drives: FloatArray) -> FloatArray:
         """Return the values of all conditions in states (n, free), (rows, n)."""
-        mesh, way = self.whole.mesh, drives[:, None]
-        z = np.asarray(way * mesh.base if self.whole.ramp else mesh.base + way * mesh.rate)
+        mesh, drive_column = self.whole.mesh, drives[:, None]
+        z = np.asarray(drive_column * mesh.base if self.whole.ramp else mesh.base + drive_column * mesh.rate)
         z[:, mesh.free] = x
         return self.conditions.values(z, LoadStage.from_problem(self.whole, drives))
 
-    def slip_rate(self, at: PathEquilibrium, number: int) -> float:
-        """Return how far a contact slips in its sense by the drive, at an equilibrium."""
+    def measure_slip_rate(self, at: PathEquilibrium, number: int) -> float:
+        """Return the rate by the drive at which a contact slips in its sense, at an equilibrium."""
         mesh = self.whole.mesh
-        way = slip_way(mesh, mesh.contacts[number], self.whole.values(at.x, at.drive))
-        moved = self.moved_by_drive(at)
-        return float(self.friction[number].sense * (way.gradient @ moved[way.unknowns]))
+        slip = measure_slip(mesh, mesh.contacts[number], self.whole.values(at.x, at.drive))
+        moved = self.measure_rates(at)
+        return float(self.friction[number].sense * (slip.gradient @ moved[slip.unknowns]))
 
-    def moved_by_drive(self, at: PathEquilibrium) -> FloatArray:
-        """Return the change of all unknowns by the drive at an equilibrium, (size,)."""
+    def measure_rates(self, at: PathEquilibrium) -> FloatArray:
+        """Return the rates of all unknowns by the drive at an equilibrium, (size,)."""
         mesh = self.whole.mesh
         moved = np.array(mesh.base if self.whole.ramp else mesh.rate, float)
         moved[mesh.free] = at.rate
         return moved
 
-    def row_value(self, at: PathEquilibrium, row: int, travel: float = 1.0) -> float:
-        """Return one row of `values` at an equilibrium: of a way of slip how much it grows in the sense of travel."""
+    def measure_condition(self, at: PathEquilibrium, row: int, travel: float = 1.0) -> float:
+        """Return one row of `values` at an equilibrium: of slip the rate at which it grows in the sense of travel."""
         condition = self.conditions.all[row]
         if condition.kind == "slip":
-            return travel * self.slip_rate(at, condition.number)
+            return travel * self.measure_slip_rate(at, condition.number)
         stage = LoadStage.from_problem(self.whole, np.array([at.drive]))
         return float(self.conditions.value(condition, self.whole.values(at.x, at.drive)[None], stage)[0])
 
@@ -249,11 +249,11 @@ class PieceOfPath:
         """Return True if some condition is violated at an equilibrium, in the sense of travel."""
         values = self.values(at.x[None], np.array([at.drive]))[:, 0]
         for row in self.conditions.rows_of("slip"):
-            values[row] = self.row_value(at, row, 1.0 if travel >= 0 else -1.0)
+            values[row] = self.measure_condition(at, row, 1.0 if travel >= 0 else -1.0)
         return not (values >= -roundings).all()
 
-    def roundings_of_force(self, at: PathEquilibrium) -> float:
-        """Return which force of a contact is rounding at an equilibrium."""
+    def estimate_force_rounding(self, at: PathEquilibrium) -> float:
+        """Return the size of a contact's force that counts as rounding at an equilibrium."""
         z = self.whole.values(at.x, at.drive)
         return FORCE_ROUNDING * max(1.0, *(abs(float(z[contact.unknown])) for contact in self.whole.mesh.contacts))
 
@@ -281,11 +281,11 @@ class PieceOfPath:
         radii += [beams[item.beam].section.thinnest for item in items if isinstance(item, BeamOnBeam)]
         return min(radii, default=np.inf)
 
-    def grows_along(self, at: PathEquilibrium, number: int) -> float:
-        """Return how force or gap of a contact changes with the drive at an equilibrium."""
+    def measure_growth(self, at: PathEquilibrium, number: int) -> float:
+        """Return the rate by the drive of the force of a closed contact, or the gap of an open one."""
         mesh = self.whole.mesh
         contact = mesh.contacts[number]
-        moved = self.moved_by_drive(at)
+        moved = self.measure_rates(at)
         if number in self.closed:
             return float(moved[contact.unknown])
         gap = measure(mesh, contact, self.whole.values(at.x, at.drive))
@@ -295,10 +295,10 @@ class PieceOfPath:
         """Return the number of a contact's force among the free unknowns of the whole problem."""
         return int(np.searchsorted(self.whole.mesh.free, self.whole.mesh.contacts[number].unknown))
 
-    def slot_in_own(self, number: int, slide: bool = False) -> int:
+    def find_own_slot(self, number: int, slide: bool = False) -> int:
         """Return the number of a contact's force, or place, among the free unknowns of the own problem."""
         contact = self.whole.mesh.contacts[number]
-        return int(np.searchsorted(self.own.mesh.free, contact.slide if slide else contact.unknown))
+        return int(np.searchsorted(self.own_problem.mesh.free, contact.slide if slide else contact.unknown))
 
 
 @lru_cache(maxsize=64)
@@ -352,7 +352,7 @@ class StepsOfPiece:
         for row in piece.conditions.rows_of("slip"):
             number = piece.conditions.all[row].number
             ends = (PathEquilibrium(*end, 0) for end in zip(self.x[1:], self.drive[1:], self.rate[1:], strict=True))
-            grown = np.array([piece.slip_rate(end, number) for end in ends]) * width[:, 0]
+            grown = np.array([piece.measure_slip_rate(end, number) for end in ends]) * width[:, 0]
             values[row] = np.diff(values[row], axis=-1, prepend=values[row, :, :1])
             values[row, :, -1] = np.minimum(values[row, :, -1], grown)
         return values
@@ -368,7 +368,7 @@ class WatchedProblem(NetworkProblem):
         """Return the equilibria on the way to the next requested values, as far as nothing happens."""
         marched = super().march(walk)
         if len(marched.drive) and self.piece is not None:
-            states = [walk.here, *marched.states]
+            states = [walk.current, *marched.states]
             together = SIDES_TOGETHER if self.piece.conditions.rows_of("touch") else NODES_TOGETHER
             for first in range(0, len(states) - 1, together):
                 some = states[first : first + together + 1]

@@ -77,7 +77,7 @@ def guess_laid(mesh: Discretisation, z: FloatArray, element: int, tension: float
 def presses(piece: PieceOfPath, at: PathEquilibrium) -> bool:
     """Return True if everything that lies on an obstacle presses on it."""
     whole, rows = piece.grow(at), piece.conditions.rows_of("pulls")
-    return all(piece.row_value(whole, row) > -ROUNDING_OF_KIND["pulls"] for row in rows)
+    return all(piece.measure_condition(whole, row) > -ROUNDING_OF_KIND["pulls"] for row in rows)
 
 
 def find_nearest_places(

@@ -147,13 +147,13 @@ def _locate_touch(
             beyond = piece.with_flanks([*piece.flanks, *places], piece.closed)
             begin = piece.carry(guess, beyond)
             number = _new_side(beyond, condition.number, least.parameter)
-            slot = beyond.slot_in_own(number)
+            slot = beyond.find_own_slot(number)
             state = beyond.solve_at_level(begin, {slot: 1.0}, 0.0)
             if state is not None:
                 x = np.array(state.x)
                 x[slot] = 0.0  # but for rounding
                 at = beyond.grow(beyond.shrink(begin)._replace(x=x, drive=state.drive, rate=state.rate))
-                if -BESIDE_SHARE <= step.share_of(at, beyond) <= 1 + BESIDE_SHARE:
+                if -BESIDE_SHARE <= step.find_share(at, beyond) <= 1 + BESIDE_SHARE:
                     return ContactChange("begins", number, at, unstable, unstable, condition.number, condition, beyond)
         elif isinstance(condition.item, BeamOnBeam) or find_pads_at(piece, condition, least.parameter):
             return None  # it is the node that begins to touch
@@ -207,7 +207,7 @@ def _contact_around(piece: PieceOfPath, condition: Condition, parameter: float) 
     straight wall.
     """
     mesh, item = piece.whole.mesh, condition.item
-    of_beam = piece.sides_of(item.beam)
+    of_beam = piece.list_sides(item.beam)
     sides = [(k, mesh.contacts[k]) for k in of_beam]
     before = [k for k, contact in sides if mesh.elements.cuts[contact.element, 1] < parameter]
     after = [k for k, contact in sides if mesh.elements.cuts[contact.element, 1] > parameter]
@@ -247,13 +247,13 @@ def _pass_force_on(piece: PieceOfPath, at: PathEquilibrium, beyond: PieceOfPath,
 
 def _zero_of(piece: PieceOfPath, begin: PathEquilibrium, row: int) -> PathEquilibrium | None:
     """Return the equilibrium at which a condition is just met, near a guess: by secants of the drive."""
-    at = piece.own.solve(piece.shrink(begin).x, begin.drive)
+    at = piece.own_problem.solve(piece.shrink(begin).x, begin.drive)
     if at is None:
         return None
     drives, values = list[float](), list[float]()
     for _ in range(N_SECANTS):
         whole = piece.grow(at)
-        value = piece.row_value(whole, row)
+        value = piece.measure_condition(whole, row)
         drives.append(at.drive)
         values.append(value)
         if abs(value) < ZERO_LEVEL:
@@ -266,7 +266,7 @@ def _zero_of(piece: PieceOfPath, begin: PathEquilibrium, row: int) -> PathEquili
         goal = at.drive - value / slope
         if goal == at.drive or (len(values) > 3 and abs(value) >= abs(values[-2])):
             return whole
-        solved = piece.own.solve(at.x + (goal - at.drive) * at.rate, goal)
+        solved = piece.own_problem.solve(at.x + (goal - at.drive) * at.rate, goal)
         if solved is None:
             return None
         at = solved
@@ -288,7 +288,7 @@ def row_rate(piece: PieceOfPath, at: PathEquilibrium, row: int) -> float:
     """Return how a row of `PieceOfPath.values` changes with the drive at an equilibrium."""
     step = RATE_STEP / max(1.0, float(np.abs(at.rate).max(initial=0.0)))
     sides = [at._replace(x=at.x + change * at.rate, drive=at.drive + change) for change in (step, -step)]
-    ahead, behind = (piece.row_value(side, row) for side in sides)
+    ahead, behind = (piece.measure_condition(side, row) for side in sides)
     return (ahead - behind) / (2 * step)
 
 
@@ -332,7 +332,7 @@ def _enter_located(change: ContactChange, condition: Condition, beyond: PieceOfP
     if at is None:
         return None
     if condition.kind == "touch":
-        return beyond, at, beyond.grows_along(at, change.number)
+        return beyond, at, beyond.measure_growth(at, change.number)
     kind, last = _condition_beyond(beyond, condition)
     return beyond, at, row_rate(beyond, at, beyond.conditions.find_row(kind, condition.item, last))
 
@@ -352,7 +352,7 @@ def _move_into_beam(piece: PieceOfPath, change: ContactChange) -> Entered | None
     beyond = piece.with_flanks([*left, *new], piece.closed - {change.number})
     number = _new_side(beyond, change.contact, place)
     begin = _pass_force_on(piece, change.at, beyond, change.number)
-    slide = beyond.slot_in_own(number, slide=True)
+    slide = beyond.find_own_slot(number, slide=True)
     at = beyond.solve_at_level(begin, {slide: 1.0}, place)
     if at is None:
         return None
@@ -383,7 +383,7 @@ def _part_contact(piece: PieceOfPath, change: ContactChange, free: bool = False)
     if lies:
         guess_laid(new, full, new.contacts[last].element, float(force @ [np.cos(angle), np.sin(angle)]))
     begin = begin._replace(x=full[new.free])
-    low, high = (beyond.slot_in_own(number, slide=True) for number in (first, last))
+    low, high = (beyond.find_own_slot(number, slide=True) for number in (first, last))
     at = beyond.solve_at_level(begin, {high: 1.0, low: -1.0}, 2 * NEW_PLACE)
     if lies and (at is None or not presses(beyond, at)):
         return _part_contact(piece, change, free=True)
@@ -408,7 +408,7 @@ def _lie_from_root(piece: PieceOfPath, change: ContactChange, free: bool = False
     if lies:
         at = new.contacts[number].element + (laid > 0)
         guess_laid(new, full, at, float(force @ [np.cos(angle), np.sin(angle)]))
-    slide = beyond.slot_in_own(number, slide=True)
+    slide = beyond.find_own_slot(number, slide=True)
     solved = beyond.solve_at_level(begin._replace(x=full[new.free]), {slide: 1.0}, parameter)
     if lies and (solved is None or not presses(beyond, solved)):
         return _lie_from_root(piece, change, free=True)
@@ -423,7 +423,7 @@ def _lay_or_free(piece: PieceOfPath, change: ContactChange, sense: float) -> Ent
     mesh, z = piece.whole.mesh, piece.whole.values(change.at.x, change.at.drive)
     contact = mesh.contacts[change.number]
     item: Any = contact.item
-    sides = piece.sides_of(item.beam)
+    sides = piece.list_sides(item.beam)
     if condition.kind == "lies":
         laid = -1 if change.number == sides[0] and False in piece.conditions.roots(item) else 1
         laid = laid if laid < 0 or change.number == sides[-1] or change.number + 1 in sides else -1
@@ -443,5 +443,5 @@ def _lay_or_free(piece: PieceOfPath, change: ContactChange, sense: float) -> Ent
         guess_laid(new, full, element, float(z[side_contact[-2:]] @ along))
     else:
         full[new.elements.unknowns[element, -2:]] = z[side_contact[-2]] * along
-    at = beyond.own.solve(full[new.free][beyond.own_mask], change.at.drive)
+    at = beyond.own_problem.solve(full[new.free][beyond.own_mask], change.at.drive)
     return None if at is None else (beyond, beyond.grow(at), sense)

@@ -114,7 +114,7 @@ def _apply(rows: FloatArray, values: FloatArray) -> Any:
 def find_lines(mesh: Discretisation, z: FloatArray, stage: LoadStage, elements: Any) -> ElementLines:
     """Return the lines of elements (m,) in n states (n, size); contacts stand at their places."""
     moved = with_places(mesh, z)
-    whole, fields = moved.elements, energy.fields(moved, z, *stage)
+    whole, fields = moved.elements, energy.compute_fields(moved, z, *stage)
 
     def pick(table: Any, rank: int = 2) -> Any:
         return np.broadcast_to(table, (len(z), *table.shape[-rank:]))[:, elements]

@@ -183,10 +183,10 @@ class SlidingEquations(EquationsWithNodes):
         return unloaded + sum(curvatures) / max(len(curvatures), 1)
 
     # -- equations -----------------------------------------------------------------------------------------------------
-    def linearise(self, free: FloatArray, way: float) -> LinearEquations:
+    def linearise(self, free: FloatArray, place: float) -> LinearEquations:
         """Return the equations linearised at some unknowns; not a number where elements vanish."""
         mesh, count, slots = self.mesh, self.plain.n, self.slots
-        n, z = self.n, np.asarray(self.values(free, way))
+        n, z = self.n, np.asarray(self.values(free, place))
         moved = mesh.base if self.ramp else mesh.rate
         sides = self.mesh.side_contacts
         places = z[[contact.slide for contact in sides]]
@@ -197,19 +197,19 @@ class SlidingEquations(EquationsWithNodes):
         laid = self.find_laid_parts(z)
         self._lay(laid)
         bare = self._drop_tension(z, laid)[mesh.free][:count]
-        placed = self.place_among_all(self.plain.linearise(bare, way))
+        placed = self.place_among_all(self.plain.linearise(bare, place))
         residual, tangent, change = placed
         for part in laid:
             self._lay_rows(part, z, residual, tangent)
         rows = self.add_nodes(z, placed)
         pressing: dict[int, tuple[SideAt, int]] = {}  # sides that touch by their forces, with their last rows
         for number, contact in enumerate(sides):
-            force, place, flag = slots[contact.unknown], slots[contact.slide], slots[contact.flag]
+            force, slide, flag = slots[contact.unknown], slots[contact.slide], slots[contact.flag]
             tangent[flag, flag] = 1.0
             if contact.closed is not None:
                 residual[flag] = z[contact.flag] - contact.laid
             if not self.is_pressing(contact, z):
-                residual[force], tangent[force, force], tangent[place, place] = -free[force], -1.0, 1.0
+                residual[force], tangent[force, force], tangent[slide, slide] = -free[force], -1.0, 1.0
                 continue
             side, value = self.side_at(contact, z), float(z[contact.unknown])
             inside, rate = slots[side.unknowns] >= 0, moved[side.unknowns]
@@ -222,15 +222,15 @@ class SlidingEquations(EquationsWithNodes):
                 tangent[indices, force] -= press_row
                 residual[force], change[force] = -side.gap, -side.gap_row @ rate
                 tangent[force, indices] -= press_row
-                tangent[force, place] = -side.by_place[0]
+                tangent[force, slide] = -side.by_place[0]
                 rows.append(SymmetricRow(indices[indices < count], -press_row[indices < count], 0.0))
             else:
                 residual[force] = z[leading.unknown] - value
                 tangent[force, force], tangent[force, slots[leading.unknown]] = -1.0, 1.0
-            residual[place], change[place] = side.tangency, side.tangency_row @ rate
-            tangent[place, indices] += turn_row
-            tangent[place, place] = side.by_place[1]
-            tangent[:count, place] += self._differentiate_by_place(bare, way, z, number, laid)
+            residual[slide], change[slide] = side.tangency, side.tangency_row @ rate
+            tangent[slide, indices] += turn_row
+            tangent[slide, slide] = side.by_place[1]
+            tangent[:count, slide] += self._differentiate_by_place(bare, place, z, number, laid)
             pressing[contact.unknown] = side, len(rows)
             bound = any(part.element in (contact.element, contact.element + 1) for part in laid)
             stiffness = 0.0 if bound else -max(side.curvature, 0.0) / max(value, SMALLEST_FORCE)
@@ -270,11 +270,11 @@ class SlidingEquations(EquationsWithNodes):
         return contact.closed if contact.closed is not None else bool(z[find_leading(self.mesh, contact).unknown] > 0)
 
     def _differentiate_by_place(
-        self, free: FloatArray, way: float, z: FloatArray, number: int, laid: list[LaidPart]
+        self, free: FloatArray, place: float, z: FloatArray, number: int, laid: list[LaidPart]
     ) -> FloatArray:
         """Return the change of the residuals without contacts with one of the places."""
         if self._is_plain and not laid:
-            return self._differentiate_plain(way, z, number)
+            return self._differentiate_plain(place, z, number)
         sides, unknown = [], self.mesh.side_contacts[number].slide
         for step in (PLACE_STEP, -PLACE_STEP):
             beside = z.copy()
@@ -282,7 +282,7 @@ class SlidingEquations(EquationsWithNodes):
             if not self.move_to(beside[[contact.slide for contact in self.mesh.side_contacts]]):
                 return np.full(len(free), np.nan)
             self._lay(laid)
-            residual = np.array(self.plain.linearise(free, way).residual)
+            residual = np.array(self.plain.linearise(free, place).residual)
             for part in laid:
                 unknowns, rows, _ = compute_laid_rows(self.mesh, part, beside)
                 slots = self.slots[unknowns]
@@ -344,19 +344,19 @@ class SlidingEquations(EquationsWithNodes):
         return energy.count_negative_pivots(at.frozen) - forces - (len(at.frozen) - self.plain.n)
 
     # -- gradients -----------------------------------------------------------------------------------------------------
-    def gradient(self, free: Any, way: Any) -> Any:
+    def gradient(self, free: Any, place: Any) -> Any:
         """Return the gradient by all unknowns, (size,); where they are complex by a difference along that step."""
-        if np.iscomplexobj(free) or np.iscomplexobj(way):
-            steps, ahead = np.imag(free), float(np.imag(way))
+        if np.iscomplexobj(free) or np.iscomplexobj(place):
+            steps, ahead = np.imag(free), float(np.imag(place))
             size = max(float(np.abs(steps).max(initial=0.0)), abs(ahead), np.finfo(float).tiny)
             share = PLACE_STEP / size
             sides = [
-                self.gradient(np.real(free) + sign * share * steps, float(np.real(way)) + sign * share * ahead)
+                self.gradient(np.real(free) + sign * share * steps, float(np.real(place)) + sign * share * ahead)
                 for sign in (1.0, -1.0)
             ]
             return 0.5 * (sides[0] + sides[1]) + 1j * (sides[0] - sides[1]) / (2 * share)
-        drive, share = self.factors(way)
-        return self.evaluate_gradient(np.asarray(self.values(free, way)), drive, share)
+        drive, share = self.factors(place)
+        return self.evaluate_gradient(np.asarray(self.values(free, place)), drive, share)
 
     def gradients(self, z: FloatArray, drive: FloatArray) -> FloatArray:
         """Return the gradients by all unknowns of states (p, size), (p, size)."""

@@ -85,8 +85,9 @@ class StepBetween:
     def solve(self, share: float) -> PathEquilibrium | None:
         """Return the equilibrium of the piece at a share of the step."""
         x, drive = self.interpolate(share)
-        at = correct(self.part.own, x[self.part.own_mask], drive)
-        if at is None or largest_motion(self.part.own, at.x - x[self.part.own_mask]) > MAX_MISS * self.moved + 1e-9:
+        problem, guess = self.part.own_problem, x[self.part.own_mask]
+        at = correct(problem, guess, drive)
+        if at is None or largest_motion(problem, at.x - guess) > MAX_MISS * self.moved + 1e-9:
             return None
         return at
 
@@ -104,12 +105,12 @@ class StepBetween:
     def _follows_drive(self) -> bool:
         """True if motions go on with the drive at both ends: no limit point lies between them."""
         moves = self.part.whole.motions
-        chord, way = (self.last.x - self.first.x)[moves], self.last.drive - self.first.drive
+        chord, travel = (self.last.x - self.first.x)[moves], self.last.drive - self.first.drive
         return bool(self._steps.are_smooth[0]) and all(
-            float(at.rate[moves] @ chord) * way > 0 for at in (self.first, self.last)
+            float(at.rate[moves] @ chord) * travel > 0 for at in (self.first, self.last)
         )
 
-    def share_of(self, at: PathEquilibrium, piece: PieceOfPath | None = None) -> float:
+    def find_share(self, at: PathEquilibrium, piece: PieceOfPath | None = None) -> float:
         """Return at which share of the step an equilibrium lies: by its drive, or by motions that do not follow it.
 
         It has the unknowns of another `piece` if that is given.
@@ -118,14 +119,14 @@ class StepBetween:
             return float((at.drive - self.first.drive) / (self.last.drive - self.first.drive))
         at = at if piece is None else piece.carry(at, self.part)
         weights = arc_weights(self.part.whole, self.part.options.span)
-        chord, way = self.last.place - self.first.place, at.place - self.first.place
+        chord, offset = self.last.place - self.first.place, at.place - self.first.place
         finite = np.isfinite(weights)
-        return float((weights * chord)[finite] @ way[finite] / ((weights * chord)[finite] @ chord[finite]))
+        return float((weights * chord)[finite] @ offset[finite] / ((weights * chord)[finite] @ chord[finite]))
 
     def contains(self, at: PathEquilibrium, guess: FloatArray) -> bool:
         """Return True if an equilibrium lies within the step, near a guess."""
         start = largest_motion(self.part.whole, at.x - guess) <= MAX_MISS * self.moved + 1e-9
-        return start and -BESIDE_STEP <= self.share_of(at) <= 1 + BESIDE_STEP
+        return start and -BESIDE_STEP <= self.find_share(at) <= 1 + BESIDE_STEP
 
     def bisect(self, row: int) -> PathEquilibrium | None:
         """Return the equilibrium of the piece at which a condition is just met, by its drive alone; None if lost."""
@@ -137,7 +138,7 @@ class StepBetween:
             at = self.solve(share)
             if at is None:
                 raise ArithmeticError
-            return part.row_value(part.grow(at), row, self.travel)
+            return part.measure_condition(part.grow(at), row, self.travel)
 
         try:
             end = next(iter(self.find_negative(row)), len(self.shares) - 1)

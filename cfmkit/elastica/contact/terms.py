@@ -61,10 +61,10 @@ def gaps(mesh: Discretisation, contact: ContactAt, z: Any) -> Any:
     return (item.outline.distance(place * length).value - item.radius) / length
 
 
-def slip_way(mesh: Discretisation, contact: ContactAt, z: Any, near: float | None = None) -> MeasuredGap:
+def measure_slip(mesh: Discretisation, contact: ContactAt, z: Any, anchor: float | None = None) -> MeasuredGap:
     """Return how far the point of a pad that touches has come along an obstacle or a stop, rolling counted.
 
-    The sense is that of the normal turned by -90 deg. Around a closed obstacle it is what is nearest to `near`.
+    The sense is that of the normal turned by -90 deg. Around a closed obstacle it is what is nearest to `anchor`.
     """
     item, length = contact.item, mesh.scales.length
     at = poses(mesh.attachments, z, [contact.place])
@@ -77,8 +77,8 @@ def slip_way(mesh: Discretisation, contact: ContactAt, z: Any, near: float | Non
         assert isinstance(item, NodeOnObstacle)
         slip, round_length = item.outline.way_along(place * length, item.radius), item.outline.round_length(item.radius)
         value, along, bend = slip.value / length, slip.gradient, slip.hessian * length
-        if near is not None and np.isfinite(round_length):
-            value = value - np.rint((np.real(value) - near) * length / round_length) * round_length / length
+        if anchor is not None and np.isfinite(round_length):
+            value = value - np.rint((np.real(value) - anchor) * length / round_length) * round_length / length
         radius = item.radius / length
     unknowns = at.unknowns[0]
     hessian = np.zeros((4, 4), np.result_type(bend, jacobian))
@@ -91,21 +91,21 @@ def slip_way(mesh: Discretisation, contact: ContactAt, z: Any, near: float | Non
     return MeasuredGap(value + radius * z[at.unknowns[0, 3]], unknowns, gradient, hessian)
 
 
-def rub_values(mesh: Discretisation, contact: ContactAt, state: FrictionState, z: FloatArray) -> FloatArray:
+def measure_friction(mesh: Discretisation, contact: ContactAt, state: FrictionState, z: FloatArray) -> FloatArray:
     """Return what must not become negative in states (n, size), (n,): what is left of the friction where it sticks.
 
     Where it slips it is how far it has come in its sense, which must grow.
     """
     if state.sense == 0:
         return np.asarray(contact.item.friction * z[:, contact.unknown] - np.abs(z[:, contact.rub]))
-    ways = [float(slip_way(mesh, contact, state_values, state.anchor).value) for state_values in z]
+    ways = [float(measure_slip(mesh, contact, state_values, state.anchor).value) for state_values in z]
     round_length = np.inf
     if isinstance(contact.item, NodeOnObstacle):
         round_length = contact.item.outline.round_length(contact.item.radius) / mesh.scales.length
     return state.sense * (np.array(ways) if np.isinf(round_length) else np.unwrap(ways, period=round_length))
 
 
-def friction_of(contact: ContactAt, z: Any) -> FrictionState:
+def find_friction(contact: ContactAt, z: Any) -> FrictionState:
     """Return what friction does at a closed contact: as it was set, or as the state says."""
     if contact.friction is not None:
         return contact.friction
@@ -135,8 +135,8 @@ def contact_contribution(mesh: Discretisation, contact: ContactAt, z: Any) -> Co
     gap, force, extra = measure(mesh, contact, z), z[contact.unknown], contact.own_unknowns
     motions, slip = gap.unknowns, None
     if contact.rub >= 0:
-        state = friction_of(contact, z)
-        slip = slip_way(mesh, contact, z, state.anchor)
+        state = find_friction(contact, z)
+        slip = measure_slip(mesh, contact, z, state.anchor)
         motions = np.union1d(gap.unknowns, slip.unknowns)
     unknowns, count, size = np.append(motions, extra), len(motions), len(motions) + len(extra)
     kind = np.result_type(gap.value, gap.gradient, gap.hessian, z.dtype)

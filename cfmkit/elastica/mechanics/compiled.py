@@ -67,10 +67,10 @@ class CompiledEquations(NumpyEquations):
         mesh, arrays = self.mesh, model_arrays(self)
         free = mesh.free[mesh.free < mesh.numbering.size] if has_more_unknowns(mesh) else mesh.free
         numbered, fixed = numbered_row(mesh.numbering, free.tobytes())
-        row = make_row(arrays, self._counts(arrays), numbered)
+        row = make_row(arrays, self._count_parts(arrays), numbered)
         vars(self).update(arrays=fixed | arrays, row=row, code=find_module())
 
-    def _counts(self, arrays: Mapping[str, Any]) -> dict[str, int]:
+    def _count_parts(self, arrays: Mapping[str, Any]) -> dict[str, int]:
         """Return the counts of a `Model` that depend on more than topology."""
         mesh = self.mesh
         counts = {"springs": len(mesh.springs), "loads": len(mesh.loads), "ramp": self.ramp, "follows": self.follows}
@@ -93,7 +93,7 @@ class CompiledEquations(NumpyEquations):
         self.arrays["bend"][elements] = (tables["weight"] * tables["rigidity"]) @ slope_products(self.mesh.degree)
 
     def exchange(self, mesh: Discretisation) -> CompiledEquations:
-        """Return those with other contacts closed, or other elements that stretch; free unknowns are among these."""
+        """Return the equations with other contacts closed, or other elements that stretch, for some of its unknowns."""
         exchanged, unit, counts = copy(self), self.unit, dict[str, int]()
         arrays: dict[str, Any] = {"axial": np.ascontiguousarray(mesh.elements.axial)} if mesh.moving is None else {}
         if mesh.free is not self.mesh.free:
@@ -169,44 +169,49 @@ class CompiledEquations(NumpyEquations):
         solutions, count = np.array(right, float, order="C"), np.zeros(1, np.int64)
         if self.code.resolve(self.row, np.ascontiguousarray(free, float), solutions, count, place):
             raise np.linalg.LinAlgError("the tangent is singular")
-        return solutions, int(self._count_each(free[None], np.array([place]), count)[0])
+        return solutions, int(self._count_unstable_each(free[None], np.array([place]), count)[0])
 
-    def _count_each(self, free: FloatArray, places: FloatArray, told: Any) -> Any:
-        """Return counts of C (k,); where loads follow and told < 0 is a parity, eigenvalues are counted."""
-        unknown = np.flatnonzero(told < 0)
+    def _count_unstable_each(self, free: FloatArray, places: FloatArray, counts: Any) -> Any:
+        """Return numbers of unstable directions (k,) from those of C, where loads follow a negative one is a parity."""
+        unknown = np.flatnonzero(counts < 0)
         if self.follows and len(unknown):
             tangents = [self.linearise(free[k], places[k]).tangent for k in unknown.tolist()]
-            told[unknown] = energy.count_divergent(self.mesh, np.array(tangents))
-        return told
+            counts[unknown] = energy.count_divergent(self.mesh, np.array(tangents))
+        return counts
 
     def solve(
-        self, free: FloatArray, way: float, border: Border | None = None, tolerance: float = 1e-10, quick: bool = False
+        self,
+        free: FloatArray,
+        place: float,
+        border: Border | None = None,
+        tolerance: float = 1e-10,
+        quick: bool = False,
     ) -> PathEquilibrium | None:
         """Return an equilibrium, as the method in numpy does; `quick` is for the march, which has its own loop."""
-        solved = self._newton(free[None], [way], border, tolerance, quick)
-        x, at, rate, (code, told, effort) = (values[0] for values in solved)
+        solved = self._solve_newton(free[None], [place], border, tolerance, quick)
+        x, at, rate, (code, count, effort) = (values[0] for values in solved)
         if code:
             return None
-        unstable = told if told >= 0 else self._count_each(x[None], solved[1], solved[3][:, 1])[0]
+        unstable = count if count >= 0 else self._count_unstable_each(x[None], solved[1], solved[3][:, 1])[0]
         return PathEquilibrium(x, float(at), rate, int(unstable), float(effort))
 
     def solve_each(
-        self, free: FloatArray, way: FloatArray, tolerance: float = 1e-10, quick: bool = False
+        self, free: FloatArray, places: FloatArray, tolerance: float = 1e-10, quick: bool = False
     ) -> SolvedStates:
         """Return the equilibria near k guesses."""
-        x, ways, rate, outcomes = self._newton(free, way, None, tolerance, quick)
+        x, at, rate, outcomes = self._solve_newton(free, places, None, tolerance, quick)
         converged = outcomes[:, 0] == 0
-        unstable = self._count_each(x, ways, np.where(converged, outcomes[:, 1], 0.0).astype(np.int64))
+        unstable = self._count_unstable_each(x, at, np.where(converged, outcomes[:, 1], 0.0).astype(np.int64))
         return SolvedStates(converged, x, rate, unstable, outcomes[:, 2])
 
-    def _newton(self, free: Any, way: Any, border: Border | None, *numbers: float) -> tuple[FloatArray, ...]:
-        """Return unknowns, places of the way, slopes, and codes, counts and efforts (k, 3), from k guesses."""
-        x, ways = np.array(free, float, order="C"), np.array(way, float)
+    def _solve_newton(self, free: Any, places: Any, border: Border | None, *numbers: float) -> tuple[FloatArray, ...]:
+        """Return unknowns, places, slopes, and codes, unstable directions and efforts (k, 3), from k guesses."""
+        x, at = np.array(free, float, order="C"), np.array(places, float)
         rate, outcomes = np.empty(x.shape), np.zeros((len(x), 3))
         row, level = (NO_NUMBERS, 0.0) if border is None else (np.ascontiguousarray(border.row, float), border.level)
-        if self.code.solve(self.row, x, ways, row, rate, outcomes, level, *numbers):
+        if self.code.solve(self.row, x, at, row, rate, outcomes, level, *numbers):
             raise MemoryError
-        return x, ways, rate, outcomes
+        return x, at, rate, outcomes
 
     def compare(self, z: FloatArray, drive: FloatArray, degree: int, tolerance: float) -> ComparedStates | None:
         """Return how states (p, size) differ from equilibria of a higher degree; None unless all beams are plain."""
@@ -235,7 +240,7 @@ class CompiledEquations(NumpyEquations):
         self.code.load_work(self.row, np.ascontiguousarray(z, float), work)
         return work
 
-    def soften(self, free: FloatArray, place: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
+    def find_softest(self, free: FloatArray, place: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
         """Return flexibility and shape of the softest mode."""
         shape = np.array(vector, float)
         return self.code.soften(self.row, np.ascontiguousarray(free, float), shape, place, rounds), shape
@@ -247,7 +252,7 @@ class CompiledEquations(NumpyEquations):
         parity = start.unstable % 2 if self.follows else start.unstable
         rows[0, :n], rows[0, n : 2 * n] = start.x, start.rate
         rows[0, 2 * n :] = start.drive, start.effort, parity, -1.0
-        plan_row = plan_row_of(plan, parity, False)
+        plan_row = pack_plan(plan, parity, False)
         before = plan.before
         previous_row = NO_NUMBERS if before is None else np.concatenate([before.x, before.rate, [before.drive]])
         any_vector = NO_NUMBERS if plan.any_vector is None else plan.any_vector
@@ -256,8 +261,8 @@ class CompiledEquations(NumpyEquations):
             shapes, laws = shape_row(plan.finer_degree)[0], self._find_laws(plan.finer_degree)
         code = self.code.march(self.row, plan_row, previous_row, goals, rows, stored, any_vector, shapes, laws)
         rows = rows[1 : 1 + stored[0]].copy()
-        drive, effort, told, target = rows[:, 2 * n :].T
-        unstable, at_targets = told.astype(np.int64), target.astype(np.int64)
+        drive, effort, counts, target = rows[:, 2 * n :].T
+        unstable, at_targets = counts.astype(np.int64), target.astype(np.int64)
         x, rate, step = rows[:, :n], rows[:, n : 2 * n], float(plan_row[0])
         *ends, error = plan_row[-3:].tolist()
         reason = MarchCode(code)
@@ -268,7 +273,7 @@ class CompiledEquations(NumpyEquations):
 
     def _cut_at_stability_change(self, march: NaturalMarch, unstable: int) -> NaturalMarch:
         """Return a march with its unstable directions counted, as far as their number stays the same."""
-        counts = self._count_each(march.x, march.drive, march.unstable)
+        counts = self._count_unstable_each(march.x, march.drive, march.unstable)
         changed = np.flatnonzero(counts != unstable).tolist()
         names = ("x", "drive", "rate", "effort", "target")
         same: dict[str, Any] = {name: getattr(march, name)[: changed[0] if changed else None] for name in names}
@@ -302,8 +307,8 @@ def compare_rows(
     return ComparedStates._make((code == 0, *numbers, ends))
 
 
-def plan_row_of(plan: MarchPlan, unstable: int, start: bool) -> FloatArray:
-    """Return a `Plan` of march.h."""
+def pack_plan(plan: MarchPlan, unstable: int, start: bool) -> FloatArray:
+    """Return the numbers of a plan as `Plan` of march.h has them."""
     on_branch = plan.branch is not None
     numbers = plan.step, plan.span, plan.largest_turn, FORCE_CHANGE, plan.tolerance, unstable, on_branch, start
     return np.array((*numbers, N_POWERS, 0.0, 0.0, np.nan), float)

@@ -66,7 +66,7 @@ def partials(mesh: Discretisation, z: Any, drive: Any, names: Collection[str]) -
 
     By name those of `Elements`, and `origin`, `arm` and `frame` of the attachments that elements end at.
     """
-    e, at, load = mesh.elements, energy.fields(mesh, z, drive), energy.line_load(mesh, drive)
+    e, at, load = mesh.elements, energy.compute_fields(mesh, z, drive), energy.line_load(mesh, drive)
     w, bent = e.weight, bending(e, at.curvature)
 
     def places_of_starts() -> Any:
@@ -172,7 +172,7 @@ def _term_slopes(
             if held is None and not _is_stepped(network, acting):
                 continue
             for k, drive in enumerate(at.drive.tolist()):
-                part = energy.term(network, acting, moved[k], drive)
+                part = energy.evaluate_term(network, acting, moved[k], drive)
                 yield k, d, part.unknowns, np.imag(part.gradient) / COMPLEX_STEP
 
 

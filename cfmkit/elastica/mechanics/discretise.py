@@ -145,13 +145,13 @@ class Discretisation:
     moving: MovingCuts | None = None  # None: no end of an element moves
 
     @cached_property
-    def known(self) -> dict[Any, Any]:
-        """Cache of objects made of these arrays, by their maker; it does not go to other processes."""
+    def cache(self) -> dict[Any, Any]:
+        """Objects made of these arrays, by their maker; they do not go to other processes."""
         return {}
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what is sent to another process."""
-        return {name: value for name, value in self.__dict__.items() if name != "known"}
+        return {name: value for name, value in self.__dict__.items() if name != "cache"}
 
     @property
     def bodies(self) -> Mapping[str, tuple[int, int, int]]:
@@ -217,15 +217,15 @@ def discretise(
     cuts, laws = _cut_beams(network, fits, pieces, tension, flanks)
     point_loads = [
         (load, grows)
-        for grows, given in enumerate((network.loads, drive.loads))
-        for load in given
+        for grows, group in enumerate((network.loads, drive.loads))
+        for load in group
         if isinstance(load, PointLoad)
     ]
     numbering = number(_find_topology(network, degree, cuts, [load for load, _ in point_loads]))
     acting = iter(numbering.acting)
     springs = tuple(Attached(spring, next(acting)) for spring in network.springs)
     loads = tuple(Attached(load, next(acting), bool(grows)) for load, grows in point_loads)
-    places = np.array([pair for own in cuts.values() for pair in itertools.pairwise(own)])
+    places = np.array([pair for ends in cuts.values() for pair in itertools.pairwise(ends)])
     arrays = fill_arrays(numbering, scales, places, [(network, drive)], [fits], driven)
     attachments = Attachments(numbering.places, **{name: at[0] for name, at in arrays.places.items()})
     floors = np.array([_find_floor(beam, drive, scales, fits, name) for name, beam in network.beams.items()])
@@ -240,8 +240,8 @@ def discretise(
     if driven is not None:
         rate[numbering.bodies[driven.node][driven.motion % FRAME_OF_DRIVE]] = driven.sense
     arms = ((attachments.arm[:, 0] != 0) | (attachments.arm[:, 1] != 0)).tobytes()
-    acts = [(attached.places, *_acts_on(attached.item)) for attached in (*springs, *loads)]
-    acts += [((contact.place,), *_acts_on(contact.item)) for contact in contacts]
+    acts = [(attached.places, *_find_actions(attached.item)) for attached in (*springs, *loads)]
+    acts += [((contact.place,), *_find_actions(contact.item)) for contact in contacts]
     free = find_free(numbering, tuple(held), arms, tuple(acts))
     if contacts:
         free = np.append(free, np.arange(numbering.size, size))
@@ -268,6 +268,7 @@ def _cut_beams(
 
 
 def _find_units(network: Network, drive: Drive, fits: BeamFits) -> MechanicsUnits:
+    """Return the mean beam length, EI of the first beam over its square, and the unit of the drive."""
     bundle = fits.bundle
     lengths = [np.real(fits[bundle.names[k]].length) for k in bundle.others]
     lengths += bundle.length[fits.number].real.tolist() if bundle.plain else []
@@ -304,7 +305,7 @@ def _find_topology(network: Network, degree: int, cuts: Mapping[str, list[float]
         tuple(network.nodes),
         network.links,
         tuple(link.node for link in network.links if swings_with_master(network, link.node)),
-        tuple((b.start, b.end, b.start_joint == "pin", b.end_joint == "pin", len(own) - 1) for b, own in beams),
+        tuple((b.start, b.end, b.start_joint == "pin", b.end_joint == "pin", len(ends) - 1) for b, ends in beams),
         tuple(tuple(spring_ends(spring)) for spring in network.springs) + tuple((load.node,) for load in loads),
         tuple(contact.node for contact in network.contacts if not isinstance(contact, BeamSide)),
     )
@@ -334,10 +335,10 @@ def _number_contacts(
     first = numbering.size + len(touching)
     size = first + 3 * count
     for unknown, (k, contact), place in zip(itertools.count(numbering.size), touching, numbering.touching):
-        own = ContactAt(contact, place, unknown, k)
+        at = ContactAt(contact, place, unknown, k)
         if contact.friction:
-            own, size = own._replace(rub=size, flag=size + 1, anchor=size + 2), size + 3
-        contacts.append(own)
+            at, size = at._replace(rub=size, flag=size + 1, anchor=size + 2), size + 3
+        contacts.append(at)
     for unknown, flank in enumerate(flanks, start=first):
         item: Any = network.contacts[flank.number]
         on_beam = [element for element, name in enumerate(elements.beam) if name == item.beam]
@@ -352,8 +353,8 @@ def _number_contacts(
     return tuple(contacts), size
 
 
-def _acts_on(item: Any) -> tuple[bool, bool]:
-    """Return whether something acts on the place of an attachment, and whether on its rotation."""
+def _find_actions(item: Any) -> tuple[bool, bool]:
+    """Return whether a spring, load or contact acts on the place of an attachment, and whether on its rotation."""
     if isinstance(item, TorsionSpring):
         return False, True
     if isinstance(item, Stop) and item.turns:  # alone it holds no rotation
@@ -375,8 +376,10 @@ def raise_degree(mesh: Discretisation, degree: int) -> Discretisation:
     ends, ahead = coarse.n_ends, numbering.size - coarse.size
     size = mesh.size + ahead
     contacts = tuple(
-        one._replace(**{name: value + ahead for name in UNKNOWNS_OF_CONTACTS if (value := getattr(one, name)) >= 0})
-        for one in mesh.contacts
+        contact._replace(
+            **{name: value + ahead for name in UNKNOWNS_OF_CONTACTS if (value := getattr(contact, name)) >= 0}
+        )
+        for contact in mesh.contacts
     )
     moving = mesh.moving
     if moving is not None:
@@ -391,17 +394,17 @@ def raise_degree(mesh: Discretisation, degree: int) -> Discretisation:
     )  # fmt: skip
 
 
-def embed(mesh: Discretisation, fine: Discretisation, z: Any) -> Any:
-    """Return a state (..., size) of a network in the unknowns of one of a higher degree: shapes are hierarchical."""
+def refine_state(mesh: Discretisation, fine: Discretisation, z: Any) -> Any:
+    """Return a state (..., size) in the unknowns of the same network with a higher degree: shapes are hierarchical."""
     ends, old, new = mesh.numbering.n_ends, mesh.elements.unknowns, fine.elements.unknowns
-    found = np.zeros((*z.shape[:-1], fine.size), z.dtype)
-    found[..., :ends] = z[..., :ends]
-    found[..., new[:, 8 : mesh.degree + 7]] = z[..., old[:, 8 : mesh.degree + 7]]
-    found[..., new[:, -2:]] = z[..., old[:, -2:]]
+    raised = np.zeros((*z.shape[:-1], fine.size), z.dtype)
+    raised[..., :ends] = z[..., :ends]
+    raised[..., new[:, 8 : mesh.degree + 7]] = z[..., old[:, 8 : mesh.degree + 7]]
+    raised[..., new[:, -2:]] = z[..., old[:, -2:]]
     behind = mesh.size - mesh.numbering.size
     if behind:
-        found[..., -behind:] = z[..., -behind:]
-    return found
+        raised[..., -behind:] = z[..., -behind:]
+    return raised
 
 
 def make_inextensible(mesh: Discretisation, elements: Any) -> Discretisation:
@@ -414,7 +417,7 @@ def make_inextensible(mesh: Discretisation, elements: Any) -> Discretisation:
 
 def keep_equations(mesh: Discretisation, changed: Discretisation) -> Discretisation:
     """Return arrays that differ in closed contacts and stretching alone, with equations made from those of a mesh."""
-    equations = ((key, made) for key, made in mesh.known.items() if hasattr(made, "exchange"))
+    equations = ((key, made) for key, made in mesh.cache.items() if hasattr(made, "exchange"))
     exchanged = ((key, made.exchange(changed)) for key, made in equations)
-    changed.known.update((key, made) for key, made in exchanged if made is not None)
+    changed.cache.update((key, made) for key, made in exchanged if made is not None)
     return changed

@@ -60,7 +60,7 @@ class SectionFields(SectionForces):
     Tables of elements may be dual, too. `slope_x`, `slope_y` and `turning` have derivatives then.
     """
 
-    curvature: Any  # phi' by the element's parameter, of `fields`
+    curvature: Any  # phi' by the element's parameter, of `compute_fields`
 
     def __init__(self, elements: BeamElements, angle: Any, h: Any, v: Any) -> None:
         """Compute the forces; the rest when it is needed."""
@@ -108,17 +108,17 @@ class SectionFields(SectionForces):
         return chain(self.shear * f, partials, self.all_arguments)
 
 
-def fields(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> SectionFields:
+def compute_fields(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> SectionFields:
     """Return rotations and section forces at the Gauss points, of one state (size,) or of several (n, size)."""
     e, rule = mesh.elements, basis(mesh.degree)
-    own = z[..., e.unknowns]
-    rotation = own[..., rotation_columns(mesh.degree)]
+    element_unknowns = z[..., e.unknowns]
+    rotation = element_unknowns[..., rotation_columns(mesh.degree)]
     load = line_load(mesh, drive, share)
-    h, v = (own[..., axis - 2, None] + load[..., axis, None] * e.ahead for axis in (0, 1))
+    h, v = (element_unknowns[..., axis - 2, None] + load[..., axis, None] * e.ahead for axis in (0, 1))
     at = SectionFields(e, e.angle + rotation @ rule.values.T, h, v)
     at.curvature = rotation @ rule.slopes.T
     if e.laid is not None:
-        at.normal = np.where(e.laid[..., None], own[..., None, -2], at.normal)
+        at.normal = np.where(e.laid[..., None], element_unknowns[..., None, -2], at.normal)
         at.shear = np.where(e.laid[..., None], 0.0, at.shear)
     return at
 
@@ -137,16 +137,18 @@ def line_load(mesh: Discretisation, drive: Any, share: Any = 1.0) -> Any:
 
 def gradient(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
     """Return the gradient of the functional by all unknowns, (size,); complex where z or the arrays are."""
-    own, kind = element_gradients(mesh, z, drive, share)
-    parts = [term(mesh, acting, z, drive, share) for acting in mesh.acting]
+    element_rows, kind = element_gradients(mesh, z, drive, share)
+    parts = [evaluate_term(mesh, acting, z, drive, share) for acting in mesh.acting]
     total = np.zeros(mesh.size, np.result_type(kind, *(part.gradient for part in parts)))
-    np.add.at(total, mesh.elements.unknowns, own)
+    np.add.at(total, mesh.elements.unknowns, element_rows)
     for part in parts:
         np.add.at(total, part.unknowns, part.gradient)
     return total
 
 
-def term(mesh: Discretisation, acting: Attached | ContactAt, z: Any, drive: Any, share: Any = 1.0) -> Contribution:
+def evaluate_term(
+    mesh: Discretisation, acting: Attached | ContactAt, z: Any, drive: Any, share: Any = 1.0
+) -> Contribution:
     """Return the term of a spring, a load or a contact in one state."""
     if isinstance(acting, ContactAt):
         return contact_contribution(mesh, acting, z)
@@ -154,6 +156,7 @@ def term(mesh: Discretisation, acting: Attached | ContactAt, z: Any, drive: Any,
 
 
 def _end_poses(mesh: Discretisation, z: Any) -> tuple[AttachmentPoses, AttachmentPoses]:
+    """Return the poses of the first and of the last ends of all elements."""
     return tuple(poses(mesh.attachments, z, mesh.elements.ends[:, side]) for side in (0, 1))  # type: ignore[return-value]
 
 
@@ -164,10 +167,11 @@ def element_gradients(mesh: Discretisation, z: Any, drive: Any, share: Any) -> t
     """
     parts = dict(element_forces(mesh, z, drive, share))
     e, kind = mesh.elements, np.result_type(*parts.values())
-    own = np.zeros((*np.broadcast_shapes(*(part.shape[:-1] for part in parts.values())), e.unknowns.shape[1]), kind)
+    shape = np.broadcast_shapes(*(part.shape[:-1] for part in parts.values()))
+    gradients = np.zeros((*shape, e.unknowns.shape[1]), kind)
     for columns, part in parts.items():
-        own[..., list(columns)] = part
-    return own, kind
+        gradients[..., list(columns)] = part
+    return gradients, kind
 
 
 def element_forces(mesh: Discretisation, z: Any, drive: Any, share: Any) -> Iterator[tuple[tuple[int, ...], Any]]:
@@ -175,7 +179,7 @@ def element_forces(mesh: Discretisation, z: Any, drive: Any, share: Any) -> Iter
 
     The arrays of the network, and the unknowns, may be dual.
     """
-    e, rule, at = mesh.elements, basis(mesh.degree), fields(mesh, z, drive, share)
+    e, rule, at = mesh.elements, basis(mesh.degree), compute_fields(mesh, z, drive, share)
     start, end = _end_poses(mesh, z)
     last = z[..., e.unknowns[:, -2:]]
     first = last + line_load(mesh, drive, share) * e.length[..., None]
@@ -191,35 +195,36 @@ def element_forces(mesh: Discretisation, z: Any, drive: Any, share: Any) -> Iter
 
 def hessian(mesh: Discretisation, z: Any, drive: Any, share: Any = 1.0) -> Any:
     """Return the Hessian by all unknowns, (size, size): symmetric unless loads follow."""
-    e, rule, at = mesh.elements, basis(mesh.degree), fields(mesh, z, drive, share)
+    e, rule, at = mesh.elements, basis(mesh.degree), compute_fields(mesh, z, drive, share)
     start, end = _end_poses(mesh, z)
     columns, (f, g) = rotation_columns(mesh.degree), at.factors
-    own = np.zeros((*e.unknowns.shape, e.unknowns.shape[1]))
+    blocks = np.zeros((*e.unknowns.shape, e.unknowns.shape[1]))
     bend, turn = e.weight * bending(e, at.curvature).stiffness, e.weight * (at.normal * f - g * at.shear)
     slopes, values = rule.slopes, rule.values
-    own[:, columns[:, None], columns] = (slopes.T * bend[:, None, :]) @ slopes + (values.T * turn[:, None, :]) @ values
+    bending_block = (slopes.T * bend[:, None, :]) @ slopes
+    blocks[:, columns[:, None], columns] = bending_block + (values.T * turn[:, None, :]) @ values
     by_force = np.stack([g * at.cos - f * at.sin, g * at.sin + f * at.cos], axis=1) * e.weight[:, None, :]
     coupling = -(by_force @ values)
     for axis in (0, 1):
-        own[:, columns, axis - 2] = own[:, axis - 2, columns] = coupling[:, axis]
-    own[:, -2:, 0:3], own[:, -2:, 4:7] = -start.jacobian, end.jacobian
-    own[:, 0:3, -2:], own[:, 4:7, -2:] = -start.jacobian.transpose(0, 2, 1), end.jacobian.transpose(0, 2, 1)
-    own[:, -2, -2] = -(e.weight * (e.axial * at.cos**2 + e.shear * at.sin**2)).sum(axis=1)
-    own[:, -1, -1] = -(e.weight * (e.axial * at.sin**2 + e.shear * at.cos**2)).sum(axis=1)
-    own[:, -2, -1] = own[:, -1, -2] = -(e.weight * (e.axial - e.shear) * at.cos * at.sin).sum(axis=1)
+        blocks[:, columns, axis - 2] = blocks[:, axis - 2, columns] = coupling[:, axis]
+    blocks[:, -2:, 0:3], blocks[:, -2:, 4:7] = -start.jacobian, end.jacobian
+    blocks[:, 0:3, -2:], blocks[:, 4:7, -2:] = -start.jacobian.transpose(0, 2, 1), end.jacobian.transpose(0, 2, 1)
+    blocks[:, -2, -2] = -(e.weight * (e.axial * at.cos**2 + e.shear * at.sin**2)).sum(axis=1)
+    blocks[:, -1, -1] = -(e.weight * (e.axial * at.sin**2 + e.shear * at.cos**2)).sum(axis=1)
+    blocks[:, -2, -1] = blocks[:, -1, -2] = -(e.weight * (e.axial - e.shear) * at.cos * at.sin).sum(axis=1)
     last = z[e.unknowns[:, -2:]]
     first = last + line_load(mesh, drive, share) * e.length[:, None]
-    own[:, 2, 2] += (first * start.arm).sum(axis=1)
-    own[:, 6, 6] -= (last * end.arm).sum(axis=1)
+    blocks[:, 2, 2] += (first * start.arm).sum(axis=1)
+    blocks[:, 6, 6] -= (last * end.arm).sum(axis=1)
     total = np.zeros((mesh.size, mesh.size))
-    np.add.at(total, (e.unknowns[:, :, None], e.unknowns[:, None, :]), own)
+    np.add.at(total, (e.unknowns[:, :, None], e.unknowns[:, None, :]), blocks)
     for acting in mesh.acting:
-        part = term(mesh, acting, z, drive, share)
+        part = evaluate_term(mesh, acting, z, drive, share)
         np.add.at(total, (part.unknowns[:, None], part.unknowns), part.hessian)
     return total
 
 
-def values(mesh: Discretisation, free: Any, drive: Any, share: Any = 1.0) -> Any:
+def expand_unknowns(mesh: Discretisation, free: Any, drive: Any, share: Any = 1.0) -> Any:
     """Return all unknowns from the free ones: held ones are displaced by their share, and by the drive."""
     z = share * mesh.base + drive * mesh.rate
     z = z.astype(np.result_type(z, free))

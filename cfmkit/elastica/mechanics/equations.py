@@ -146,7 +146,7 @@ class NumpyEquations:
         object.__setattr__(self, "unit", force_units(self.mesh))
 
     def exchange(self, mesh: Discretisation) -> NumpyEquations | None:
-        """Return those with other contacts closed, or other elements that stretch; None if they must be made anew."""
+        """Return the equations with other contacts closed, or other elements that stretch; None: make new ones."""
         return None
 
     def refill(self, elements: Any, tables: Mapping[str, Any]) -> None:
@@ -180,17 +180,17 @@ class NumpyEquations:
 
     def values(self, free: Any, place: Any) -> Any:
         """Return all unknowns, (size,)."""
-        return energy.values(self.mesh, free, *self.factors(place))
+        return energy.expand_unknowns(self.mesh, free, *self.factors(place))
 
     def gradient(self, free: Any, place: Any) -> Any:
         """Return the gradient by all unknowns, (size,)."""
         drive, share = self.factors(place)
-        return energy.gradient(self.mesh, energy.values(self.mesh, free, drive, share), drive, share)
+        return energy.gradient(self.mesh, energy.expand_unknowns(self.mesh, free, drive, share), drive, share)
 
-    def _leave(self, *_: Any, **__: Any) -> Any:
+    def _leave_to_functions(self, *_: Any, **__: Any) -> Any:
         """Return None: what `CompiledEquations` computes under these names functions in numpy compute elsewhere."""
 
-    measure_nodes = measure_curvatures = search_sides = locate = compare = measure_load_work = _leave
+    measure_nodes = measure_curvatures = search_sides = locate = compare = measure_load_work = _leave_to_functions
 
     def evaluate(self, z: FloatArray, drive: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
         """Return gradient (size,) and Hessian (size, size) by all unknowns."""
@@ -204,7 +204,7 @@ class NumpyEquations:
     def linearise(self, free: FloatArray, place: float) -> LinearEquations:
         """Return the equations linearised at some unknowns."""
         drive, share = self.factors(place)
-        z, chosen = energy.values(self.mesh, free, drive, share), self.mesh.free
+        z, chosen = energy.expand_unknowns(self.mesh, free, drive, share), self.mesh.free
         tangent = energy.hessian(self.mesh, z, drive, share)[np.ix_(chosen, chosen)]
         stepped = self.gradient(free, place + 1j * COMPLEX_STEP)[chosen]
         return LinearEquations(stepped.real.copy(), tangent, stepped.imag / COMPLEX_STEP)
@@ -247,14 +247,14 @@ class NumpyEquations:
             largest, moved = float(size.max(initial=0.0)), float(size[moves].max(initial=0.0))
             old, old_way, free, place = free, place, free + change, place + along
             if quick and largest**2 < tolerance:
-                effort = self._effort(old, old_way) + float(at.change @ step)
+                effort = self._compute_effort(old, old_way) + float(at.change @ step)
                 return PathEquilibrium(free, place, rate, self.count_unstable(at), effort)
             # a large force multiplies rounding: accept where motions stand and forces no longer come nearer
             rounds = (moved < SAME_EQUILIBRIUM and largest < 2e-5) or (moved < MOTION_RTOL and largest < 1e-3)
             stands = rounds and largest > 0.3 * last
             if stands or largest < tolerance * (1 + np.abs(free[moves]).max(initial=0.0)):
                 unstable = self.count_unstable(at)
-                return PathEquilibrium(free, place, rate, unstable, self._effort(free, place))
+                return PathEquilibrium(free, place, rate, unstable, self._compute_effort(free, place))
             last = largest
         return None
 
@@ -278,7 +278,7 @@ class NumpyEquations:
             np.array([state.effort for state in states]),
         )
 
-    def soften(self, free: FloatArray, place: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
+    def find_softest(self, free: FloatArray, place: float, vector: FloatArray, rounds: int) -> tuple[float, FloatArray]:
         """Return flexibility and shape of the softest mode of the motions after some powers of their flexibility.
 
         The flexibility is 0 if the tangent is singular.
@@ -295,7 +295,7 @@ class NumpyEquations:
             vector = moved / np.linalg.norm(moved[moves])
         return flexibility, vector
 
-    def _effort(self, free: FloatArray, place: float) -> float:
+    def _compute_effort(self, free: FloatArray, place: float) -> float:
         moved = self.mesh.base if self.ramp else self.mesh.rate
         return float(self.gradient(free, place) @ moved)
 
@@ -305,7 +305,7 @@ class NumpyEquations:
         A step is accepted if motions and forces change little, the prediction was good, and the chord agrees with the
         slopes at both of its ends; it ends before one at which the number of unstable directions changes.
         """
-        return _march(self, start, np.asarray(targets, float), plan)
+        return _march_in_numpy(self, start, np.asarray(targets, float), plan)
 
 
 def force_units(mesh: Discretisation) -> FloatArray:
@@ -349,7 +349,10 @@ def _leads_back(
     return largest_motion(equations, back.x - current.x) < SAME_EQUILIBRIUM + 1e-3 * moved
 
 
-def _march(equations: NumpyEquations, start: PathEquilibrium, targets: FloatArray, plan: MarchPlan) -> NaturalMarch:
+def _march_in_numpy(
+    equations: NumpyEquations, start: PathEquilibrium, targets: FloatArray, plan: MarchPlan
+) -> NaturalMarch:
+    """Return the states on the way to targets: `march` of march.c in numpy."""
     current, step = start, plan.step
     earlier = (
         [] if plan.before is None or plan.before.drive == start.drive else [plan.before]

@@ -42,19 +42,19 @@ def equations(
 ) -> NumpyEquations:
     """Return the equations of a network, compiled if they can be."""
     key = equations, ramp, load_compiled() is not None
-    if key not in mesh.known:
+    if key not in mesh.cache:
         compiled = key[2] and _is_compiled(mesh)
         if mesh.moving is not None and compiled:
-            mesh.known[key] = CompiledSides(copy_moved_tables(mesh) if mesh.elements.weight.ndim > 2 else mesh, ramp)
+            mesh.cache[key] = CompiledSides(copy_moved_tables(mesh) if mesh.elements.weight.ndim > 2 else mesh, ramp)
         elif mesh.moving is not None:
-            mesh.known[key] = SlidingEquations.from_mesh(mesh, ramp, equations)
+            mesh.cache[key] = SlidingEquations.from_mesh(mesh, ramp, equations)
         elif compiled:
-            mesh.known[key] = CompiledEquations(mesh, ramp)
+            mesh.cache[key] = CompiledEquations(mesh, ramp)
         elif mesh.contacts:
-            mesh.known[key] = ContactEquations(mesh, ramp, plain=equations(open_all_contacts(mesh), ramp))
+            mesh.cache[key] = ContactEquations(mesh, ramp, plain=equations(open_all_contacts(mesh), ramp))
         else:
-            mesh.known[key] = NumpyEquations(mesh, ramp)
-    return mesh.known[key]  # type: ignore[no-any-return]
+            mesh.cache[key] = NumpyEquations(mesh, ramp)
+    return mesh.cache[key]  # type: ignore[no-any-return]
 
 
 def _is_compiled(mesh: Discretisation) -> bool:
@@ -106,7 +106,7 @@ class CompiledSides(CompiledEquations):
         return bool(self._lies(z[:, self.mesh.free]).any())
 
     def exchange(self, mesh: Discretisation) -> CompiledEquations:
-        """Return those with other contacts closed; their free unknowns are among these."""
+        """Return the equations with other contacts closed; their free unknowns are among these."""
         exchanged = super().exchange(mesh)
         for name in ("reference", "_flags"):
             vars(exchanged).pop(name, None)
@@ -117,7 +117,7 @@ class CompiledSides(CompiledEquations):
     linearise = _delegate("linearise")
     count_unstable = _delegate("count_unstable")
     resolve = _delegate("resolve")
-    soften = _delegate("soften")
+    find_softest = _delegate("find_softest")
 
     def measure_curvatures(self, z: FloatArray) -> FloatArray | None:
         """Return the curvatures of gaps at contacts of sides in n states, (sides, n); None where something lies."""

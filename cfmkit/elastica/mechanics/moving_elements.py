@@ -100,7 +100,7 @@ def copy_moved_tables(mesh: Discretisation) -> Discretisation:
 
 def _parts(mesh: Discretisation) -> list[tuple[Any, str, float]]:
     """Return rows of `mesh.moving` in each smooth part of each beam, its name and a place inside the part."""
-    if _parts not in mesh.known:
+    if _parts not in mesh.cache:
         assert mesh.moving is not None
         numbers, parts = np.asarray(mesh.moving.elements), []
         for beam in dict.fromkeys(mesh.elements.beam[number] for number in numbers):
@@ -110,8 +110,8 @@ def _parts(mesh: Discretisation) -> list[tuple[Any, str, float]]:
                 rows = np.flatnonzero(of_beam & (begin <= middles) & (middles < end))
                 if len(rows):
                     parts.append((rows, beam, 0.5 * (begin + end)))
-        mesh.known[_parts] = parts
-    return mesh.known[_parts]  # type: ignore[no-any-return]
+        mesh.cache[_parts] = parts
+    return mesh.cache[_parts]  # type: ignore[no-any-return]
 
 
 def unloaded_beam_at(

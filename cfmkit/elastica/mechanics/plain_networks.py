@@ -151,7 +151,7 @@ def _refill(
         arrays, row = arrays | terms, make_row(terms, {}, row)
     arrays = {**kind.equations.arrays, **arrays}
     vars(exchanged).update(vars(kind.equations), mesh=mesh, unit=arrays["unit"], arrays=arrays, row=row)
-    mesh.known.update((key, exchanged) for key, made in old.known.items() if made is kind.equations)
+    mesh.cache.update((key, exchanged) for key, made in old.cache.items() if made is kind.equations)
     return mesh
 
 

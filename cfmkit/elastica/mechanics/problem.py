@@ -80,32 +80,35 @@ class NetworkProblem:
 
     def solve_each(self, guesses: Sequence[FloatArray], drives: Sequence[float]) -> list[PathEquilibrium | None]:
         """Return the equilibria near guesses at their drives, in compiled code."""
-        found = self.equations.solve_each(np.array(guesses), np.array(drives))
-        each = zip(found.free, drives, found.rate, found.unstable.tolist(), found.effort.tolist(), strict=True)
-        return [PathEquilibrium(*values) if well else None for values, well in zip(each, found.converged, strict=True)]
+        solved = self.equations.solve_each(np.array(guesses), np.array(drives))
+        columns = zip(solved.free, drives, solved.rate, solved.unstable.tolist(), solved.effort.tolist(), strict=True)
+        return [
+            PathEquilibrium(*values) if well else None for values, well in zip(columns, solved.converged, strict=True)
+        ]
 
     def march_whole(self, walk: Walk, stiffnesses: tuple[float, float]) -> MarchedSteps | None:
-        """Return the whole way from its start, None if something may happen: `march` begins with the steps taken.
+        """Return the steps to the last requested value, None if something may happen: then `march` begins with them.
 
-        Nothing does if all is stable, and no eigenvalue at either end as small as a stiffness by far.
+        Nothing happens if all is stable, and no eigenvalue at either end as small as a stiffness by far.
         """
-        own = self.equations
-        if not isinstance(own, CompiledEquations) or own.follows or self.mesh.fits.network.contacts:
+        system = self.equations
+        if not isinstance(system, CompiledEquations) or system.follows or self.mesh.fits.network.contacts:
             return None
-        march = self._march(walk, whole=True)
+        march = self._run_march(walk, whole=True)
         ends = zip(march.flexibilities, stiffnesses, strict=True)
         if march.code is MarchCode.DONE and all(0 < abs(soft) * stiffness < STIFF_SHARE for soft, stiffness in ends):
             return march
-        vars(self)["_begun"] = walk.here, march
+        vars(self)["_begun"] = walk.current, march
         return None
 
     def march(self, walk: Walk) -> MarchedSteps:
         """Return the equilibria on the way to the next requested values, as far as nothing happens."""
         begun: tuple[PathEquilibrium | None, Any] = vars(self).pop("_begun", (None, None))
-        taken: NaturalMarch | None = begun[1] if begun[0] is walk.here and walk.before is None else None
-        return taken or self._march(walk)
+        taken: NaturalMarch | None = begun[1] if begun[0] is walk.current and walk.before is None else None
+        return taken or self._run_march(walk)
 
-    def _march(self, walk: Walk, whole: bool = False) -> NaturalMarch:
+    def _run_march(self, walk: Walk, whole: bool = False) -> NaturalMarch:
+        """Return the steps from where a walk is; of a `whole` one with its softest modes and its error, too."""
         left = walk.targets[walk.number :]
         room = 2 * len(left) + N_SPARE_STATES
         if self.mesh.contacts:
@@ -115,7 +118,7 @@ class NetworkProblem:
             branch=walk.branch, room=room, any_vector=self._any_vector if whole else None,
             finer_degree=self.mesh.degree + DEGREES_MORE if whole and not (self.ramp or walk.number) else 0,
         )  # fmt: skip
-        marched = self.equations.march(walk.here, left, plan)
+        marched = self.equations.march(walk.current, left, plan)
         marched.target[marched.target >= 0] += walk.number
         return marched
 
@@ -147,16 +150,16 @@ class NetworkProblem:
 
     def is_stiff(self, at: PathEquilibrium, stiffness: float) -> bool:
         """Return True if no eigenvalue is as small as a stiffness by far: two powers of the flexibility say so."""
-        flexibility, _ = self.equations.soften(at.x, at.drive, self._any_vector, N_POWERS)
+        flexibility, _ = self.equations.find_softest(at.x, at.drive, self._any_vector, N_POWERS)
         return 0 < abs(flexibility) * stiffness < STIFF_SHARE
 
-    def softest(self, at: PathEquilibrium, near: FloatArray | None = None) -> tuple[float, FloatArray | None]:
+    def softest(self, at: PathEquilibrium, nearby_mode: FloatArray | None = None) -> tuple[float, FloatArray | None]:
         """Return the size of the smallest eigenvalue and its mode, better where another is known that is near."""
         if self.equations.follows:
             return abs(float(self.modes(at, 1)[0][0])), None
-        vector = self._any_vector if near is None else near + MODE_MIX_SHARE * self._any_vector
-        rounds = FIRST_POWERS if near is None else N_POWERS
-        flexibility, mode = self.equations.soften(at.x, at.drive, vector, rounds)
+        vector = self._any_vector if nearby_mode is None else nearby_mode + MODE_MIX_SHARE * self._any_vector
+        rounds = FIRST_POWERS if nearby_mode is None else N_POWERS
+        flexibility, mode = self.equations.find_softest(at.x, at.drive, vector, rounds)
         return (1 / abs(flexibility) if flexibility else 0.0), mode
 
     @property
@@ -210,6 +213,7 @@ def _end_slopes(degree: int) -> FloatArray:
 
 @lru_cache(maxsize=64)
 def _any_vector(count: int) -> FloatArray:
+    """Return a unit vector (count,) that has a share of every mode."""
     vector = np.cos(np.arange(count) * np.arange(1, count + 1))
     return read_only(vector / np.linalg.norm(vector))
 

@@ -140,7 +140,7 @@ class Fit:
 def fit(
     beam: Beam,  # may hold complex steps
     reach: Any,  # may hold them too
-    known: Fit | None = None,  # the same fit without complex steps: it may know the parameters of the stations
+    real_fit: Fit | None = None,  # the same fit without complex steps: it may know the parameters of the stations
 ) -> Fit:
     """Return the beam's shape fitted to the vector `reach` between its ends, (dx, dy) [m].
 
@@ -157,13 +157,13 @@ def fit(
         raise InputError(f"the shape of the beam {beam.start}-{beam.end} returns to its start: it cannot be fitted")
     gap = float(np.hypot(np.real(dx - cx), np.real(dy - cy)))
     if beam.closure == "raw":
-        return _fix_breaks(Fit(0.0, 1.0, gap, length, course), beam, known)
+        return _fix_breaks(Fit(0.0, 1.0, gap, length, course), beam, real_fit)
     rotation = direction(dx * cx + dy * cy, dy * cx - dx * cy)
     scale = distance / shape_chord
-    return _fix_breaks(Fit(rotation, scale, gap, length * scale, course), beam, known)
+    return _fix_breaks(Fit(rotation, scale, gap, length * scale, course), beam, real_fit)
 
 
-def _fix_breaks(fitted: Fit, beam: Beam, known: Fit | None) -> Fit:
+def _fix_breaks(fitted: Fit, beam: Beam, real_fit: Fit | None) -> Fit:
     """Return a fit over a parameter in which complex steps move neither the shape's breaks nor the section's stations.
 
     Elements end there (`cfmkit.elastica.mechanics.discretise`). A station keeps its fraction u of the arc length: where
@@ -181,7 +181,7 @@ def _fix_breaks(fitted: Fit, beam: Beam, known: Fit | None) -> Fit:
         return fitted
     marks, steps = breaks, np.zeros(len(breaks))
     for station in stations.tolist():
-        t = (known or fitted).parameter(station)
+        t = (real_fit or fitted).parameter(station)
         ahead = _station_step(beam, station) - np.imag(fitted.arc(t))
         step = float(ahead * np.real(fitted.length) / np.real(fitted.speed(t, t)))
         k = int(np.searchsorted(marks, t - PARAMETER_TOL))

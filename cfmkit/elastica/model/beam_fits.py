@@ -200,7 +200,7 @@ class BeamFits(Mapping[str, Fit]):
         if bundle is not None:
             self.bundle = bundle
         self._known: dict[str, Fit] = {}
-        self.known: dict[Any, Any] = {}  # what else was found of the unloaded network, by its maker
+        self.cache: dict[Any, Any] = {}  # objects made of the unloaded network, by their maker
 
     @cached_property
     def bundle(self) -> Bundle:

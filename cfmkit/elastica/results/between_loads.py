@@ -41,19 +41,19 @@ class BetweenLoads(BetweenPoints):
     def _effort_on(self, path: EquilibriumPath) -> FloatArray:
         return path.drive
 
-    def _spots(self, y: FloatArray, wanted: FloatArray, near: FloatArray) -> tuple[SolvedStates, FloatArray]:
+    def _solve_places(self, y: FloatArray, wanted: FloatArray, loads: FloatArray) -> tuple[SolvedStates, FloatArray]:
         goals = wanted - self.rest / self.unit_of_motion
-        solved = [self._spot(*guess) for guess in zip(y, near, goals, strict=True)]
+        solved = [self._solve_place(*guess) for guess in zip(y, loads, goals, strict=True)]
         ways = np.array([np.nan if spot is None else spot.drive for spot in solved])
         return self._equations.collect(solved), ways
 
-    def _spot(self, y: FloatArray, near: float, goal: float) -> PathEquilibrium | None:
+    def _solve_place(self, y: FloatArray, load: float, goal: float) -> PathEquilibrium | None:
         border = Border(self.row, goal)
-        first = self._equations.solve(y, near, border)
+        first = self._equations.solve(y, load, border)
         # the solver watches poses and forces: once more, so that the load is as exact as they are
         return None if first is None else self._equations.solve(first.x, first.drive, border)
 
-    def _counts(self, near: Any, left: Any) -> Any:
+    def _find_allowed_counts(self, _nearest: Any, left: Any) -> Any:
         return np.stack([self._unstable[left], self._unstable[left + 1]], axis=1)  # a largest load: two of each kind
 
     @cached_property

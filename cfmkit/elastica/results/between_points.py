@@ -332,8 +332,8 @@ class BetweenPoints(ShortRepr):
         is_solved, changes = is_known.copy(), self._poses(self.own_unknowns[left + 1] - self.own_unknowns[left])
         asked = np.flatnonzero(~is_known)
         if len(asked):
-            spots, ways = self._spots(y[asked], wanted[asked], loads[asked])
-            alike = (spots.unstable[:, None] == self._counts(nearest[asked], left[asked])).any(axis=1)
+            spots, ways = self._solve_places(y[asked], wanted[asked], loads[asked])
+            alike = (spots.unstable[:, None] == self._find_allowed_counts(nearest[asked], left[asked])).any(axis=1)
             moved = self._poses(spots.free - y[asked])
             good = (
                 spots.converged & alike & (moved <= np.maximum(MIN_STRAY_DISTANCE, MAX_RELATIVE_STRAY * changes[asked]))
@@ -342,8 +342,8 @@ class BetweenPoints(ShortRepr):
             y[chosen], loads[chosen], is_solved[chosen] = spots.free[good], ways[good], True
         return self.path.with_states(self._numbers[nearest], y, loads, is_solved)
 
-    def _spots(self, y: FloatArray, wanted: FloatArray, _near: FloatArray) -> tuple[SolvedStates, FloatArray]:
-        """Return the equilibria at dimensionless places and their drives; `_near`: the drive at the nearest points."""
+    def _solve_places(self, y: FloatArray, wanted: FloatArray, _loads: FloatArray) -> tuple[SolvedStates, FloatArray]:
+        """Return the equilibria at dimensionless places and their drives; `_loads`: the drive at the nearest points."""
         return self._equations.solve_each(y, wanted), wanted
 
     @cached_property
@@ -362,7 +362,7 @@ class BetweenPoints(ShortRepr):
         mesh = self.path.mesh
         return np.asarray(np.abs(changes[:, mesh.free < mesh.n_motions]).max(axis=1, initial=0.0))
 
-    def _counts(self, nearest: Any, _left: Any) -> Any:
+    def _find_allowed_counts(self, nearest: Any, _left: Any) -> Any:
         """Return how many unstable directions equilibria may have, (n, k); `_left`: the points before them."""
         return self._unstable[nearest][:, None]
 
@@ -466,9 +466,9 @@ class BetweenPoints(ShortRepr):
         x, y = drive[of_stretch], self.own_unknowns[of_stretch]
         for share in CORNER_SHARES:
             nearby = place + share * (drive[point] - place)
-            spots, _ = self._spots(values_at(x, y, np.array([nearby])), np.array([nearby]), np.array([nearby]))
+            spots, _ = self._solve_places(values_at(x, y, np.array([nearby])), np.array([nearby]), np.array([nearby]))
             beside = np.array([point])
-            if not spots.converged[0] or spots.unstable[0] not in self._counts(beside, beside):
+            if not spots.converged[0] or spots.unstable[0] not in self._find_allowed_counts(beside, beside):
                 if share == CORNER_SHARES[0]:
                     return None
                 break  # of a bifurcation just behind the rest, the place is known less closely

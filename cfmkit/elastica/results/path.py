@@ -127,12 +127,12 @@ class EquilibriumPath(ShortRepr):
         at = Equilibria(self.mesh, self.at.z[points], self.at.drive[points])
         return replace(self, at=at, **{name: column[points] for name, column in self._columns.items()})
 
-    def append(self, other: EquilibriumPath) -> EquilibriumPath:
+    def append(self, following: EquilibriumPath) -> EquilibriumPath:
         """Return the points of this path, then those of another of the same network, as one."""
-        z, drive = np.vstack([self.at.z, other.at.z]), np.concatenate([self.at.drive, other.at.drive])
+        z, drive = np.vstack([self.at.z, following.at.z]), np.concatenate([self.at.drive, following.at.drive])
         columns: dict[str, Any] = {}
-        for name, own in self._columns.items():
-            column = np.concatenate([own, other._columns[name]])
+        for name, values in self._columns.items():
+            column = np.concatenate([values, following._columns[name]])
             columns[name] = read_only(column, column.dtype)
         return replace(self, at=Equilibria(self.mesh, z, drive), **columns)
 
@@ -142,10 +142,10 @@ class EquilibriumPath(ShortRepr):
         names = ("unstable", "requested", "branch", "accurate")
         return {name: getattr(self, name) for name in names} | {"at_contact": self.changes_contact}
 
-    def with_states(self, near: Any, free: FloatArray, drive: FloatArray, accurate: Any = True) -> EquilibriumPath:
+    def with_states(self, nearest: Any, free: FloatArray, drive: FloatArray, accurate: Any = True) -> EquilibriumPath:
         """Return other equilibria of the network as a path, none of them requested.
 
-        They have unknowns (m, free) and drives (m,), dimensionless, and branch and stability of points `near`, (m,).
+        They have unknowns (m, free) and drives (m,), dimensionless, branch and stability of the points `nearest`, (m,).
         """
         mesh = self.mesh
         z = mesh.base + drive[:, None] * mesh.rate
@@ -154,9 +154,9 @@ class EquilibriumPath(ShortRepr):
         return replace(
             self,
             at=Equilibria(mesh, z, drive),
-            unstable=self.unstable[near],
+            unstable=self.unstable[nearest],
             requested=read_only(np.full(count, -1), np.int64),
-            branch=self.branch[near],
+            branch=self.branch[nearest],
             accurate=read_only(np.broadcast_to(accurate, count), np.bool_),
             at_contact=False,
         )
@@ -181,7 +181,7 @@ class EquilibriumPath(ShortRepr):
 
         The force is on the node, positive along what it touches: the free side is to the left.
         """
-        contact = next(one for one in self.mesh.contacts if one.number == number)
+        contact = next(contact for contact in self.mesh.contacts if contact.number == number)
         if contact.rub < 0:
             return read_only(np.zeros(len(self))), read_only(np.full(len(self), ""), np.str_)
         z = self.at.z
@@ -221,7 +221,7 @@ class EquilibriumPath(ShortRepr):
             from cfmkit.elastica.contact.pair_gaps import least_side_gaps
 
             return read_only(least_side_gaps(self.mesh, item, self.at.z, self.at.drive) * self.mesh.scales.length)
-        mesh, contact = self.mesh, next(one for one in self.mesh.contacts if one.number == number)
+        mesh, contact = self.mesh, next(contact for contact in self.mesh.contacts if contact.number == number)
         unit = 1.0 if contact.item.turns else mesh.scales.length
         return read_only(gaps(mesh, contact, self.at.z) * unit)
 
@@ -294,19 +294,19 @@ class EquilibriumPath(ShortRepr):
 
         It is what the part after the section exerts on the part before it, in global axes.
         """
-        found, k = self.states(beam), -1 if end else 0
-        return read_only(np.stack([found.h[:, k], found.v[:, k], found.moment[:, k]], axis=-1))
+        states, k = self.states(beam), -1 if end else 0
+        return read_only(np.stack([states.h[:, k], states.v[:, k], states.moment[:, k]], axis=-1))
 
     def line_motion(self, beam: str) -> FloatArray:
         """Return the displacements of the sampled places of a beam, (n, k, 2) [m]."""
-        found = self.states(beam)
+        states = self.states(beam)
         rest = beam_states.unloaded_places(self.network, self.at, beam, self._fractions)
-        return read_only(np.stack([found.x, found.y], axis=-1) - rest)
+        return read_only(np.stack([states.x, states.y], axis=-1) - rest)
 
     def shape(self, beam: str, point: int) -> FloatArray:
         """Return the deformed centre line of a beam at one point, (k, 2) [m]."""
-        found = self.states(beam)
-        return read_only(np.stack([found.x[point], found.y[point]], axis=-1))
+        states = self.states(beam)
+        return read_only(np.stack([states.x[point], states.y[point]], axis=-1))
 
     def places(self, beam: str) -> FloatArray:
         """Return where the sampled places of a beam lie, (k,) [fraction of the arc length]."""
@@ -328,14 +328,14 @@ class EquilibriumPath(ShortRepr):
         Bending and axial stress together; of bending alone if not `axial`.
         """
         if axial not in self._beam_stresses:
-            found = stress_extremes.largest_stresses(self.network, self.at, list(self.network.beams), axial)
-            self._beam_stresses[axial] = read_only(found[0]), read_only(found[1])
+            extremes = stress_extremes.largest_stresses(self.network, self.at, list(self.network.beams), axial)
+            self._beam_stresses[axial] = read_only(extremes[0]), read_only(extremes[1])
         return self._beam_stresses[axial]
 
     def known_beam_stresses(self, axial: bool) -> FloatArray | None:
         """Return the first of `beam_stresses`; None if they are not known yet."""
-        found = self._beam_stresses.get(axial)
-        return None if found is None else found[0]
+        extremes = self._beam_stresses.get(axial)
+        return None if extremes is None else extremes[0]
 
     @cached_property
     def _beam_stresses(self) -> dict[bool, tuple[FloatArray, FloatArray]]:
@@ -375,10 +375,10 @@ def most_stressed(values: FloatArray, places: FloatArray) -> Any:
 def node_motion(at: Equilibria, node: str) -> Any:
     """Return displacement and rotation of a node, (p, 3) [m, m, rad]."""
     mesh = at.mesh
-    here = poses(mesh.attachments, at.z, [mesh.nodes[node]])
+    pose = poses(mesh.attachments, at.z, [mesh.nodes[node]])
     rest = (mesh.attachments.origin + mesh.attachments.arm)[mesh.nodes[node]]
-    moved = (here.place[:, 0] - rest) * mesh.scales.length
-    return np.concatenate([moved, at.z[:, here.unknowns[0, 3:]]], axis=1)
+    moved = (pose.place[:, 0] - rest) * mesh.scales.length
+    return np.concatenate([moved, at.z[:, pose.unknowns[0, 3:]]], axis=1)
 
 
 def node_reaction(at: Equilibria, node: str, residual: Any) -> Any:
@@ -427,7 +427,7 @@ def load_displacement(at: Equilibria, drive: Loading) -> Any:
 
 def strain_energy(at: Equilibria) -> Any:
     """Return the strain energy of beams and springs, (p,), dimensionless."""
-    e, fields = at.mesh.elements, energy.fields(at.mesh, at.z, at.drive)
+    e, fields = at.mesh.elements, energy.compute_fields(at.mesh, at.z, at.drive)
     density = 2 * bending(e, fields.curvature).energy + e.axial * fields.normal**2 + e.shear * fields.shear**2
     total = (e.weight * density).sum(axis=(1, 2)) / 2
     for spring in at.mesh.springs:
@@ -444,7 +444,7 @@ def strain_energy(at: Equilibria) -> Any:
 def largest_force(at: Equilibria) -> float:
     """Return the largest force or moment in a beam at any state, dimensionless."""
     mesh, e = at.mesh, at.mesh.elements
-    own = at.z[:, e.unknowns]
-    curvature = own[..., energy.rotation_columns(mesh.degree)] @ basis(mesh.degree).slopes.T
+    element_unknowns = at.z[:, e.unknowns]
+    curvature = element_unknowns[..., energy.rotation_columns(mesh.degree)] @ basis(mesh.degree).slopes.T
     moment = np.abs(e.rigidity * e.length[..., None] * curvature).max(initial=0.0)
-    return float(max(moment, np.abs(own[..., -2:]).max(initial=0.0)))
+    return float(max(moment, np.abs(element_unknowns[..., -2:]).max(initial=0.0)))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
-from cfmkit.elastica.mechanics.discretise import Discretisation, embed, raise_degree
+from cfmkit.elastica.mechanics.discretise import Discretisation, raise_degree, refine_state
 from cfmkit.elastica.mechanics.elements import TAUT_RATIO
 from cfmkit.elastica.mechanics.equations import ComparedStates
 from cfmkit.elastica.mechanics.march import equations
@@ -46,8 +46,8 @@ def point_errors(path: Path, indices: Sequence[int]) -> FloatArray:
     """
     if not len(path) or not len(indices):
         return np.zeros(len(indices))
-    chosen, own, mesh = list(indices), path.at, path.mesh
-    z, drives, degree = own.z[chosen], own.drive[chosen], mesh.degree + DEGREES_MORE
+    chosen, equilibria, mesh = list(indices), path.at, path.mesh
+    z, drives, degree = equilibria.z[chosen], equilibria.drive[chosen], mesh.degree + DEGREES_MORE
     compared, effort_unit = equations(mesh).compare(z, drives, degree, NEXT_CORRECTION), 1.0
     if compared is None:
         compared = compare_states(path, z, drives)
@@ -55,27 +55,28 @@ def point_errors(path: Path, indices: Sequence[int]) -> FloatArray:
         compared = compared._replace(effort=load_displacement(Equilibria(mesh, compared.ends, drives), path.load_case))
     else:
         effort_unit = mesh.scales.moment / mesh.scales.drive
-    known = compared.converged & (compared.moved <= MAX_CHANGE)
-    for row in np.flatnonzero(known & (compared.unstable != path.unstable[chosen])):
+    comparable = compared.converged & (compared.moved <= MAX_CHANGE)
+    for row in np.flatnonzero(comparable & (compared.unstable != path.unstable[chosen])):
         alike = compared.is_as_stable(path.unstable[chosen])[row]
-        known[row] = alike or _is_critical(mesh, z[row], float(drives[row]))
+        comparable[row] = alike or _is_critical(mesh, z[row], float(drives[row]))
     efforts = np.abs(effort_unit * compared.effort - path.effort[chosen])
-    reach = float(np.abs(own.z[:, : mesh.numbering.n_ends]).max())
+    reach = float(np.abs(equilibria.z[:, : mesh.numbering.n_ends]).max())
     largest = float(compared.largest.max(initial=0.0))
     if max(reach, largest) <= ROUNDING_ERROR:  # nothing moves and nothing bears: no share of rounding is an error
-        return np.where(known, ROUNDING_ERROR, np.inf)
+        return np.where(comparable, ROUNDING_ERROR, np.inf)
     load = max(largest, NO_FORCE * reach, ROUNDING_ERROR)
     size = max(float(np.abs(path.effort).max()), NO_FORCE * max(load, reach) * mesh.scales.moment / mesh.scales.drive)
-    bearing = np.maximum(efforts / size, compared.force / load) - ROUNDED_PLACES * _rises(path)[chosen] / size
+    roundings = ROUNDED_PLACES * _measure_roundings(path)[chosen]
+    bearing = np.maximum(efforts / size, compared.force / load) - roundings / size
     relative = np.maximum(bearing, compared.motion / max(reach, SMALL_MOTION))
-    return np.where(known, ERROR_SAFETY * relative + ROUNDING_ERROR, np.inf)
+    return np.where(comparable, ERROR_SAFETY * relative + ROUNDING_ERROR, np.inf)
 
 
 def compare_states(path: Path, z: FloatArray, drives: FloatArray) -> ComparedStates:
     """Return how states (p, size) of any network differ from those of a higher degree, efforts with their units."""
     mesh = path.mesh
     finer = raise_degree(mesh, mesh.degree + DEGREES_MORE)
-    n_bodies, states = mesh.numbering.n_ends, embed(mesh, finer, z)
+    n_bodies, states = mesh.numbering.n_ends, refine_state(mesh, finer, z)
     guess = states[:, finer.free]
     solved = equations(finer).solve_each(guess, drives, NEXT_CORRECTION, quick=True)
     moved = np.abs(solved.free - guess)[:, finer.free < finer.n_motions].max(axis=1, initial=0.0)
@@ -91,11 +92,11 @@ def _is_critical(mesh: Discretisation, z: FloatArray, drive: float) -> bool:
     """Return True if rounding decides at a state whether the network is stable with a higher degree."""
     finer = raise_degree(mesh, mesh.degree + DEGREES_MORE)
     problem = NetworkProblem(finer)
-    (at,) = problem.solve_each([embed(mesh, finer, z)[finer.free]], [drive])
+    (at,) = problem.solve_each([refine_state(mesh, finer, z)[finer.free]], [drive])
     return at is not None and abs(float(problem.modes(at, 1)[0][0])) < CRITICAL_STIFFNESS
 
 
-def _rises(path: Path) -> FloatArray:
+def _measure_roundings(path: Path) -> FloatArray:
     """Return by how much the effort changes at every point while the drive does by one rounding of a length of one."""
     drive, effort, slope = path.at.drive, path.effort, np.zeros(len(path) + 1)
     change = np.abs(drive[1:] - drive[:-1])
@@ -110,11 +111,13 @@ def polish(path: Path) -> Path:
     does not.
     """
     mesh, z = path.mesh, path.at.z.copy()
-    own = z[:, mesh.free]
-    solved = NetworkProblem(mesh).equations.solve_each(own, path.at.drive)
+    guess = z[:, mesh.free]
+    solved = NetworkProblem(mesh).equations.solve_each(guess, path.at.drive)
     count = int((mesh.free < mesh.n_motions).sum())
-    near = solved.converged & (np.abs(solved.free[:, :count] - own[:, :count]).max(axis=1, initial=0.0) < SAME_POINT)
-    z[:, mesh.free] = np.where(near[:, None], solved.free, own)
+    accepted = solved.converged & (
+        np.abs(solved.free[:, :count] - guess[:, :count]).max(axis=1, initial=0.0) < SAME_POINT
+    )
+    z[:, mesh.free] = np.where(accepted[:, None], solved.free, guess)
     return replace(path, at=replace(path.at, z=z))
 
 
@@ -146,23 +149,23 @@ MAX_TENSION = 1e4  # L sqrt(N/EI) of a beam beyond which it is pulled straight: 
 RECUT_SHARE = 0.15  # share of a beam from which on a taut element is cut again
 
 
-def find_tension(path: Path, known: Mapping[str, float]) -> dict[str, float]:
-    """Return the beams whose elements are taut to their largest L sqrt(N/EI), if more than is known."""
-    e, found = path.mesh.elements, dict[str, float]()
+def find_tension(path: Path, previous: Mapping[str, float]) -> dict[str, float]:
+    """Return the beams with taut elements to their largest L sqrt(N/EI), if it is far more than the previous one."""
+    e, tension = path.mesh.elements, dict[str, float]()
     if not len(path):
         return {}
     force = np.abs(path.at.z[:, e.unknowns[:, -2:]])
-    if not _tautness(path, force.max(axis=0).max(axis=1)).max() > TAUT_RATIO:
+    if not _measure_tautness(path, force.max(axis=0).max(axis=1)).max() > TAUT_RATIO:
         return {}
-    whole = _tautness(path, force.max(axis=2))
+    whole = _measure_tautness(path, force.max(axis=2))
     resolved = np.where(whole < MAX_TENSION, whole, 0.0).max(axis=0)
     for number, (beam, (left, right)) in enumerate(zip(e.beam, e.cuts, strict=True)):
         if right - left > RECUT_SHARE and resolved[number] * (right - left) > TAUT_RATIO:
-            found[beam] = max(found.get(beam, 0.0), float(resolved[number]))
-    return {beam: value for beam, value in found.items() if MORE_TENSION * known.get(beam, 0.0) < value}
+            tension[beam] = max(tension.get(beam, 0.0), float(resolved[number]))
+    return {beam: value for beam, value in tension.items() if MORE_TENSION * previous.get(beam, 0.0) < value}
 
 
-def _tautness(path: Path, force: FloatArray) -> FloatArray:
+def _measure_tautness(path: Path, force: FloatArray) -> FloatArray:
     """Return L sqrt(N/EI) of forces in elements, dimensionless, with the lengths of their beams, (..., e)."""
     e = path.mesh.elements
     bending = (e.rigidity * e.weight).sum(axis=-1) * e.length
@@ -178,5 +181,5 @@ def drop_locked_points(path: Path) -> Path:
     if not rigid.any():
         return path
     force = np.abs(path.at.z[:, path.mesh.elements.unknowns[:, -2:]]).max(axis=2)
-    locked = (_tautness(path, force)[:, rigid] > MAX_TENSION).any(axis=1)
+    locked = (_measure_tautness(path, force)[:, rigid] > MAX_TENSION).any(axis=1)
     return path.take(slice(0, int(locked.argmax()))) if locked.any() else path

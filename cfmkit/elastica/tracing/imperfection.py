@@ -69,7 +69,7 @@ def _describe_place(drive: Drive, buckling: Buckling) -> str:
     if what:
         return f"under {100 * event.drive:.4g} % of the {what}"
     place = event.drive * problem.mesh.scales.drive
-    mesh, equilibrium = problem.mesh, event.near
+    mesh, equilibrium = problem.mesh, event.nearest
     if equilibrium is not None and mesh.rate.any() and abs(place) < NO_DRIVE * float(np.abs(drive.points).max()):
         residual = energy.gradient(mesh, problem.values(equilibrium.x, equilibrium.drive), equilibrium.drive)
         force = float(residual @ mesh.rate) * mesh.scales.moment / mesh.scales.drive

@@ -59,7 +59,7 @@ def find_start(mesh: Discretisation, control: Control, remesh: Remesh | None = N
     events: list[Event] = []
     branch: PathBranch | None = None
     first: Buckling | None = None
-    ramps = list(_ramps(mesh))
+    ramps = list(_list_ramps(mesh))
     at_rest = NetworkProblem(_remove_loads(mesh), ramp=True) if ramps else problem
     at = correct(at_rest, np.zeros(len(mesh.free)), 0.0)
     if at is None:
@@ -112,7 +112,7 @@ def next_correction(control: Control) -> float:
     return min(LOOSEST_CORRECTION, CORRECTION_SHARE * control.tolerance)
 
 
-def _ramps(mesh: Discretisation) -> Iterator[tuple[str, tuple[Change, bool]]]:
+def _list_ramps(mesh: Discretisation) -> Iterator[tuple[str, tuple[Change, bool]]]:
     """Yield what is constant, in the order in which it is applied, and how the arrays are along the share of it.
 
     The second of these says whether the share, not the drive, is the way.
@@ -121,7 +121,7 @@ def _ramps(mesh: Discretisation) -> Iterator[tuple[str, tuple[Change, bool]]]:
         yield "prestress", (_remove_loads, True)
     fixed = any(not load.grows for load in mesh.loads) or np.count_nonzero(mesh.base)
     if fixed or np.count_nonzero(mesh.elements.line[:, 0]):
-        yield "constant loads", (_loads_as_drive, False)
+        yield "constant loads", (_convert_loads_to_drive, False)
 
 
 def is_tight(spring: Any) -> bool:
@@ -132,10 +132,10 @@ def is_tight(spring: Any) -> bool:
 
 
 def _make_ramp(change: tuple[Change, bool], mesh: Discretisation, remesh: Remesh | None) -> NetworkProblem:
-    """Return the problem whose way applies what is constant (`_ramps`), prestress or loads, from none to all."""
+    """Return the problem whose way applies what is constant (`_list_ramps`), prestress or loads, from none to all."""
     alter, ramp = change
-    own = None if remesh is None else (lambda flanks: alter(remesh(flanks)))
-    return NetworkProblem(alter(mesh), ramp=ramp, remesh=own)
+    remesh_altered = None if remesh is None else (lambda flanks: alter(remesh(flanks)))
+    return NetworkProblem(alter(mesh), ramp=ramp, remesh=remesh_altered)
 
 
 def _remove_loads(mesh: Discretisation) -> Discretisation:
@@ -144,7 +144,7 @@ def _remove_loads(mesh: Discretisation) -> Discretisation:
     return replace(mesh, loads=(), elements=elements, base=np.zeros(mesh.size), rate=np.zeros(mesh.size))
 
 
-def _loads_as_drive(mesh: Discretisation) -> Discretisation:
+def _convert_loads_to_drive(mesh: Discretisation) -> Discretisation:
     """Return the network with constant loads and displacements of supports as what grows with the drive."""
     line = mesh.elements.line
     grown = np.stack([np.zeros_like(line[:, 0]), line[:, 0]], axis=1)
@@ -181,8 +181,8 @@ def _remove_floors(problem: NetworkProblem, at: PathEquilibrium) -> tuple[Networ
         beams, remesh = {mesh.elements.beam[number] for number in needless.tolist()}, problem.remesh
 
         def remesh_stiff(flanks: tuple[FlankPlace, ...]) -> Discretisation:
-            found = remesh(flanks)
-            return make_inextensible(found, [k for k, name in enumerate(found.elements.beam) if name in beams])
+            arrays = remesh(flanks)
+            return make_inextensible(arrays, [k for k, name in enumerate(arrays.elements.beam) if name in beams])
 
         stiff = replace(stiff, remesh=remesh_stiff)
     return stiff, correct(stiff, at.x, at.drive) or at

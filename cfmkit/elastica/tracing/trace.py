@@ -13,7 +13,7 @@ import numpy as np
 from cfmkit.arrays import read_only
 from cfmkit.elastica.contact.path_items import ContactChange, Remeshed, StatesOfPiece, join_pieces
 from cfmkit.elastica.mechanics.design_derivatives import Equilibria
-from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise, embed, raise_degree
+from cfmkit.elastica.mechanics.discretise import Discretisation, FlankPlace, discretise, raise_degree, refine_state
 from cfmkit.elastica.mechanics.equations import NaturalMarch
 from cfmkit.elastica.mechanics.plain_networks import arrange
 from cfmkit.elastica.mechanics.problem import DEGREES_MORE
@@ -121,7 +121,7 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
     control = control or Control()
     if control.imperfection:
         perfect = replace(control, imperfection=0.0)
-        bent, name = bend(network, drive, _first_buckling(network, drive, perfect), control.imperfection)
+        bent, name = bend(network, drive, _find_first_buckling(network, drive, perfect), control.imperfection)
         path = trace(bent, drive, perfect)
         branch = path.branch if bent is network else np.where(path.branch == "primary", "imperfect", path.branch)
         return replace(path, imperfection=name, branch=read_only(branch, np.str_))
@@ -145,7 +145,7 @@ def trace(network: Network, drive: Drive, control: Control | None = None) -> Pat
 def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceAttempt:
     """Return the path on the first discretisation that reaches the tolerance, or on the best that is tried."""
     tolerance = control.tolerance
-    resolution, best, before = DegreeAndPieces(_first_degree(network, tolerance)), None, None
+    resolution, best, before = DegreeAndPieces(_find_first_degree(network, tolerance)), None, None
     attempt: TraceAttempt | None = None  # raised from the one before
     fits: BeamFits | None = None
     for count in range(MAX_ROUNDS):
@@ -158,14 +158,15 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceA
         locks = bool(network.contacts) and path.status is PathStatus.LIMIT_POINT
         taut = find_tension(path.take(path.at_requested) if locks else path, resolution.tension or {})
         if taut and count < MAX_TENSION_ROUNDS:
-            degree = max(_plain_degree(tolerance), DEGREE_OF_LAYERS)
+            degree = max(_find_plain_degree(tolerance), DEGREE_OF_LAYERS)
             resolution = replace(resolution, tension={**(resolution.tension or {}), **taut}, degree=degree)
             best, attempt = attempt, None
             continue
-        attempt = attempt if math.isfinite(attempt.path.error) else _with_error(attempt)
-        near = tolerance < attempt.path.error < NEAR_ERROR_FACTOR * tolerance
-        if near and not (resolution.degree < MAX_DEGREE and _can_be_raised(attempt)):  # which corrects all its points
-            attempt = _with_error(attempt._replace(path=polish(path)))
+        attempt = attempt if math.isfinite(attempt.path.error) else _estimate_error(attempt)
+        nearly_reached = tolerance < attempt.path.error < NEAR_ERROR_FACTOR * tolerance
+        is_raised = resolution.degree < MAX_DEGREE and _can_be_raised(attempt)  # which corrects all its points
+        if nearly_reached and not is_raised:
+            attempt = _estimate_error(attempt._replace(path=polish(path)))
         path = attempt.path
         if best is None or not path.error > max(best.path.error, tolerance):
             best = attempt
@@ -178,7 +179,7 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceA
             break
         before = path
         if resolution.degree < MAX_DEGREE:
-            resolution = replace(resolution, degree=_next_degree(path, tolerance))
+            resolution = replace(resolution, degree=_find_next_degree(path, tolerance))
             attempt = raise_attempt(attempt, resolution, control)
         elif resolution.pieces < MAX_PIECES:
             resolution, attempt = replace(resolution, pieces=2 * resolution.pieces, degree=DEGREE_OF_PIECES), None
@@ -188,19 +189,19 @@ def _reach_tolerance(network: Network, drive: Drive, control: Control) -> TraceA
     return best
 
 
-def _first_degree(network: Network, tolerance: float) -> int:
+def _find_first_degree(network: Network, tolerance: float) -> int:
     """Return the degree to begin with: a higher one costs little where there are few beams, which often buckle."""
     beams = len(network.beams)
     more = FEW_BEAMS[beams] if beams in FEW_BEAMS and not any(coils(beam) for beam in network.beams.values()) else 0
-    return _plain_degree(tolerance) + more
+    return _find_plain_degree(tolerance) + more
 
 
-def _plain_degree(tolerance: float) -> int:
+def _find_plain_degree(tolerance: float) -> int:
     lowest, highest = FIRST_DEGREES
     return min(max(math.ceil(1 - math.log10(tolerance)), lowest), highest)
 
 
-def _next_degree(path: Path, tolerance: float) -> int:
+def _find_next_degree(path: Path, tolerance: float) -> int:
     """Return the degree with which a path should reach a tolerance.
 
     The error of forces falls as the square of the last coefficients of the rotation.
@@ -215,7 +216,7 @@ def _next_degree(path: Path, tolerance: float) -> int:
 
 
 def raise_attempt(attempt: TraceAttempt, resolution: DegreeAndPieces, control: Control) -> TraceAttempt | None:
-    """Return a path with a higher degree, its points and events found from what they were.
+    """Return a path with a higher degree: its points and events are solved for from what they were.
 
     None if it is another path then.
     """
@@ -224,26 +225,27 @@ def raise_attempt(attempt: TraceAttempt, resolution: DegreeAndPieces, control: C
         return None
     fine = raise_degree(path.mesh, resolution.degree)
     problem = replace(start.problem, mesh=fine)
-    z = embed(path.mesh, fine, path.at.z)
+    z = refine_state(path.mesh, fine, path.at.z)
     guess = z[:, fine.free]
     solved = problem.equations.solve_each(guess, path.at.drive)
     moved = np.abs(solved.free - guess)[:, problem.motions].max(initial=0.0)
     if not solved.converged.all() or (solved.unstable != path.unstable).any() or not moved < MAX_RAISED_MOTION:
         return None
     z[:, fine.free] = solved.free
-    drives = _relocate(attempt, problem)
+    drives = _relocate_events(attempt, problem)
     if drives is None:
         return None
-    moved_to = {event.drive: drive for event, drive in zip(attempt.events, drives, strict=True)}
+    relocated = list(zip(attempt.events, drives, strict=True))
+    moved_to = {event.drive: drive for event, drive in relocated}
     branches = tuple(
         branch if branch is None else branch._replace(drive=moved_to.get(branch.drive, branch.drive))
         for branch in attempt.branches
     )
     unit = path.mesh.scales.drive
-    told = tuple(_tell(replace(event, drive=drive), unit) for event, drive in zip(attempt.events, drives, strict=True))
+    reported = tuple(_convert_event(replace(event, drive=drive), unit) for event, drive in relocated)
     at, names = Equilibria(fine, z, path.at.drive), _name_branches(branches, unit)
-    raised = replace(path, at=at, branch=names, events=told, error=math.inf)
-    lifted = tuple(_lift(event, drive, path.mesh, fine) for event, drive in zip(attempt.events, drives, strict=True))
+    raised = replace(path, at=at, branch=names, events=reported, error=math.inf)
+    lifted = tuple(_raise_event(event, drive, path.mesh, fine) for event, drive in relocated)
     started = start._replace(problem=problem)
     return attempt._replace(path=raised, resolution=resolution, start=started, branches=branches, events=lifted)
 
@@ -252,14 +254,14 @@ def _can_be_raised(attempt: TraceAttempt) -> bool:
     path = attempt.path
     complete = path.status is PathStatus.COMPLETE
     quiet = not attempt.start.events and not path.contact_events
-    return complete and quiet and path.error < MAX_RAISED_ERROR and _span(path) > 0
+    return complete and quiet and path.error < MAX_RAISED_ERROR and _measure_range(path.load_case) > 0
 
 
-def _relocate(attempt: TraceAttempt, problem: NetworkProblem) -> list[float] | None:
+def _relocate_events(attempt: TraceAttempt, problem: NetworkProblem) -> list[float] | None:
     """Return the drives of the events of a path on a finer resolution, None if one of them is not there."""
     path, fine = attempt.path, problem.mesh
-    span = _span(path) / path.mesh.scales.drive
-    lift = partial(_lift_free, path.mesh, fine)
+    span = _measure_range(path.load_case) / path.mesh.scales.drive
+    lift = partial(_raise_unknowns, path.mesh, fine)
     drives = []
     for event in attempt.events:
         drive = relocate(problem, event, lift, span)
@@ -269,31 +271,33 @@ def _relocate(attempt: TraceAttempt, problem: NetworkProblem) -> list[float] | N
     return drives
 
 
-def _lift_free(mesh: Discretisation, fine: Discretisation, x: FloatArray) -> FloatArray:
+def _raise_unknowns(mesh: Discretisation, fine: Discretisation, x: FloatArray) -> FloatArray:
+    """Return free unknowns in those of a higher degree."""
     z = np.zeros(mesh.size)
     z[mesh.free] = x
-    return np.asarray(embed(mesh, fine, z)[fine.free])
+    return np.asarray(refine_state(mesh, fine, z)[fine.free])
 
 
-def _lift(event: PathEvent, drive: float, mesh: Discretisation, fine: Discretisation) -> PathEvent:
+def _raise_event(event: PathEvent, drive: float, mesh: Discretisation, fine: Discretisation) -> PathEvent:
     def lift(at: PathEquilibrium | None) -> Any:
         if at is None:
             return None
-        return at._replace(x=_lift_free(mesh, fine, at.x), rate=_lift_free(mesh, fine, at.rate))
+        return at._replace(x=_raise_unknowns(mesh, fine, at.x), rate=_raise_unknowns(mesh, fine, at.rate))
 
     within = None if event.within is None else (lift(event.within[0]), lift(event.within[1]))
-    return replace(event, drive=drive, near=lift(event.near), modes=None, within=within)
+    return replace(event, drive=drive, nearest=lift(event.nearest), modes=None, within=within)
 
 
-def _with_error(attempt: TraceAttempt) -> TraceAttempt:
+def _estimate_error(attempt: TraceAttempt) -> TraceAttempt:
+    """Return an attempt whose path has its error estimated."""
     path = copy(attempt.path)  # with all that is known of it
-    errors = point_errors(path, pick_points(path, _event_places(attempt)))
+    errors = point_errors(path, pick_points(path, _list_event_drives(attempt)))
     least = CORRECTION_ERROR * attempt.start.problem.next_correction
     object.__setattr__(path, "error", max(float(errors.max()), least) if len(errors) else 0.0)
     return attempt._replace(path=path)
 
 
-def _event_places(attempt: TraceAttempt) -> list[float]:
+def _list_event_drives(attempt: TraceAttempt) -> list[float]:
     unit = attempt.path.mesh.scales.drive
     return [*(event.drive * unit for event in attempt.events), *(event.drive for event in attempt.path.contact_events)]
 
@@ -303,10 +307,10 @@ def _end_alike(path: Path, before: Path) -> bool:
     early = (PathStatus.LIMIT_POINT, PathStatus.BLOCKED, PathStatus.JUMPS, PathStatus.LOST, PathStatus.OUTSIDE)
     if path.status not in early or path.status is not before.status or not len(path) or not len(before):
         return False
-    return bool(abs(path.drive[-1] - before.drive[-1]) < SAME_END * _span(path))
+    return bool(abs(path.drive[-1] - before.drive[-1]) < SAME_END * _measure_range(path.load_case))
 
 
-def _first_buckling(network: Network, drive: Drive, control: Control) -> Buckling | None:
+def _find_first_buckling(network: Network, drive: Drive, control: Control) -> Buckling | None:
     """Return the first loss of stability on the primary path of a network."""
     primary = replace(control, branch="primary", through_folds=False)
     network = replace(network, contacts=())  # it is a property of the beams, not of what they may meet
@@ -336,7 +340,7 @@ def trace_on(
     ending = PathStop(WhyStopped.LOST, 0.0)
     unit = arrays.scales.drive
     if start.at is not None and limit != 0 and not (first_only and first):
-        options = _options(drive, control, unit)
+        options = _make_options(drive, control, unit)
         for item in follow_network(start.problem, start.at, drive.points / unit, options, start.branch):
             if isinstance(item, Point | MarchedSteps):
                 points.append(item)
@@ -359,15 +363,15 @@ def trace_on(
     status, message = _explain(start, ending, unit)
     columns = PointColumns.from_points(points)
     _settle_events(columns, events, drive, unit)
-    told = (*start.events, *(_tell(event, unit) for event in events if event.before != event.after))
-    path = _path(network, drive, _states(start, meshes, columns), columns, told, status, message)
+    reported = (*start.events, *(_convert_event(event, unit) for event in events if event.before != event.after))
+    path = _make_path(network, drive, _collect_states(start, meshes, columns), columns, reported, status, message)
     if len(points) == 2 and not events and isinstance(points[1], NaturalMarch):  # one march from the start to the end
         vars(path)["error"] = max(points[1].error, CORRECTION_ERROR * start.problem.next_correction)
     if changes:
         touched = tuple(
-            ContactEvent(one.kind, one.contact, one.at.drive * unit, one.before, one.after, one.states)
-            for found in changes.values()
-            for one in found
+            ContactEvent(item.kind, item.contact, item.at.drive * unit, item.before, item.after, item.states)
+            for changes_at_point in changes.values()
+            for item in changes_at_point
         )
         marked = read_only(np.isin(np.arange(len(path)), list(changes)), np.bool_)
         path = replace(path, contact_events=touched, at_contact=marked)
@@ -375,7 +379,7 @@ def trace_on(
     return TraceAttempt(path, resolution, start, first, tuple(events), columns.branches[: len(path)])
 
 
-def _options(drive: Drive, control: Control, unit: float) -> Options:
+def _make_options(drive: Drive, control: Control, unit: float) -> Options:
     targets = (drive.points / unit).tolist()
     span = max(*targets, 0.0) - min(*targets, 0.0)
     nearest = abs(targets[0]) / span or FIRST_STEP
@@ -385,7 +389,7 @@ def _options(drive: Drive, control: Control, unit: float) -> Options:
     )  # fmt: skip
 
 
-def _states(start: DriveStart, meshes: list[tuple[int, Discretisation]], points: PointColumns) -> Equilibria:
+def _collect_states(start: DriveStart, meshes: list[tuple[int, Discretisation]], points: PointColumns) -> Equilibria:
     """Return the states of all points on one network of elements."""
     pieces = []
     ends = [first for first, _ in meshes[1:]] + [len(points.x)]
@@ -401,7 +405,7 @@ def _states(start: DriveStart, meshes: list[tuple[int, Discretisation]], points:
     return Equilibria(*join_pieces([piece for piece in pieces if len(piece.drive)], start.problem.remesh), drives)
 
 
-def _path(
+def _make_path(
     network: Network, drive: Drive, states: Equilibria, points: PointColumns, events: tuple[Event, ...],
     status: PathStatus, message: str,
 ) -> Path:  # fmt: skip
@@ -418,7 +422,7 @@ def _path(
     return path
 
 
-def _tell(event: PathEvent, unit: float) -> Event:
+def _convert_event(event: PathEvent, unit: float) -> Event:
     return Event(event.kind, event.drive * unit, event.before, event.after)
 
 
@@ -427,10 +431,10 @@ def _settle_events(points: PointColumns, events: list[PathEvent], drive: Drive, 
 
     There the number of unstable directions is rounding.
     """
-    near = SAME_PLACE * _range(drive) / unit if events else 0.0
+    tolerance = SAME_PLACE * _measure_range(drive) / unit if events else 0.0
     for event in reversed(events):  # of several the first counts
         if event.kind == "bifurcation":
-            points.unstable[np.abs(points.drive - event.drive) <= near] = min(event.before, event.after)
+            points.unstable[np.abs(points.drive - event.drive) <= tolerance] = min(event.before, event.after)
 
 
 def _name_branches(branches: Sequence[PathBranch | None], unit: float) -> Any:
@@ -478,23 +482,19 @@ def _are_settled(attempt: TraceAttempt, control: Control, before: Path | None) -
     folds = any(event.kind == "limit point" for event in attempt.events)
     if not attempt.events or not (folds or control.branch == "primary"):
         return True
-    limit = max(EVENT_TOLERANCE, control.tolerance) * _span(path)
+    limit = max(EVENT_TOLERANCE, control.tolerance) * _measure_range(path.load_case)
     finer = raise_degree(path.mesh, path.mesh.degree + DEGREES_MORE)
     moves = finer.moving is not None  # then events are on other elements
-    drives = None if moves else _relocate(attempt, replace(attempt.start.problem, mesh=finer))
+    drives = None if moves else _relocate_events(attempt, replace(attempt.start.problem, mesh=finer))
     if drives is not None:
         places = np.array([event.drive for event in attempt.events])
         return bool(np.abs(places - drives).max() * path.mesh.scales.drive <= limit)
     if before is None or len(before.events) != len(path.events):
         return False
-    shifts = [abs(one.drive - other.drive) for one, other in zip(path.events, before.events, strict=True)]
+    shifts = [abs(event.drive - earlier.drive) for event, earlier in zip(path.events, before.events, strict=True)]
     return max(shifts) <= limit
 
 
-def _span(path: Path) -> float:
-    return _range(path.load_case)
-
-
-def _range(drive: Drive) -> float:
+def _measure_range(drive: Drive) -> float:
     points = drive.points
     return max(float(points.max()), 0.0) - min(float(points.min()), 0.0)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfmkit.elastica.mechanics.compiled import CompiledEquations, angle_laws, compare_rows, plan_row_of
+from cfmkit.elastica.mechanics.compiled import CompiledEquations, angle_laws, compare_rows, pack_plan
 from cfmkit.elastica.mechanics.compiled_module import ADDRESS_FIELDS, COUNT_FIELDS, load_compiled, slope_products
 from cfmkit.elastica.mechanics.designs import make_up, set_up
 from cfmkit.elastica.mechanics.discretise import discretise
@@ -83,7 +83,7 @@ class CompiledBatch:
         plan = MarchPlan(FIRST_STEP * span, span, largest_turn=largest_turn, tolerance=tolerance)
         efforts, codes = np.full((self.count, len(goals)), np.nan), np.zeros(self.count, np.int64)
         free, some = np.full((self.count, len(chosen), len(mesh.free)), np.nan), np.array(chosen, np.int64)
-        plan_row = plan_row_of(plan, 0, True)
+        plan_row = pack_plan(plan, 0, True)
         if not load_compiled().march_many(self.rows, plan_row, goals, efforts, codes, some, free, plan.room):
             raise MemoryError
         states = np.tile(goals[some, None] * mesh.rate, (self.count, 1, 1))
@@ -109,11 +109,11 @@ def follow_alike(path: Path, networks: Sequence[Network], control: Control) -> F
     if not _goes_straight_on(path, control):
         return None
     efforts = np.full((len(networks), len(path.load_case.points)), np.nan)
-    own = _get_common_values(path.network)
-    alike = [k for k, network in enumerate(networks) if _get_common_values(network) == own]
+    common = _get_common_values(path.network)
+    alike = [k for k, network in enumerate(networks) if _get_common_values(network) == common]
     if alike:
         try:
-            efforts[alike] = _follow(path, [networks[k] for k in alike], control)
+            efforts[alike] = _follow_together(path, [networks[k] for k in alike], control)
         except InputError:  # one of them cannot exist
             return efforts
     return efforts
@@ -144,12 +144,14 @@ def _goes_straight_on(path: Path, control: Control) -> bool:
     quiet = path.status is PathStatus.COMPLETE and not path.events and not path.unstable.any()
     simple = _get_common_values(path.network) is not None and arrays.pieces == 1 and not arrays.tension
     alone = control.imperfection or isinstance(path.load_case, Loading) or np.any(arrays.floored)
-    own = equations(arrays)
-    compiled = isinstance(own, CompiledEquations) and not own.follows  # those with contacts have arrays of their own
+    system = equations(arrays)
+    compiled = (
+        isinstance(system, CompiledEquations) and not system.follows
+    )  # those with contacts have arrays of their own
     return bool(rests and quiet and simple and not alone and compiled and not arrays.contacts)
 
 
-def _follow(path: Path, networks: list[Network], control: Control) -> Any:
+def _follow_together(path: Path, networks: list[Network], control: Control) -> Any:
     """Return the efforts of networks that are like that of a path."""
     drive, points = path.load_case, path.load_case.points
     origin, pairs = (path.network, drive), [(network, drive) for network in networks]
@@ -240,7 +242,7 @@ def trace_many(
     workers : int
         Processes to use.
     """
-    trace_chunk = partial(_outcomes, drive=drive, control=control or Control(), collect=collect)
+    trace_chunk = partial(_yield_outcomes, drive=drive, control=control or Control(), collect=collect)
     source = iter(networks)
     chunks = iter(lambda: list(islice(source, _CHUNK_SIZE)), [])
     if workers <= 1:
@@ -263,7 +265,7 @@ def _list_outcomes(trace_chunk: Callable[[list[Any]], Iterator[NetworkOutcome]],
     return list(trace_chunk(chunk))
 
 
-def _outcomes(
+def _yield_outcomes(
     networks: list[Network | Callable[[], Network]], drive: Drive, control: Control, collect: Callable[[Path], Any]
 ) -> Iterator[NetworkOutcome]:
     """Yield the outcomes of some networks: of those that are followed together, or each by itself."""
@@ -298,7 +300,7 @@ def _follow_rest(
     path: Path, built: list[Network | NetworkOutcome], number: int, control: Control
 ) -> dict[int, FloatArray] | None:
     """Return the efforts of the networks behind one that was traced, by their numbers; None if they are not like it."""
-    rest = {k: one for k, one in enumerate(built) if k > number and not isinstance(one, NetworkOutcome)}
+    rest = {k: network for k, network in enumerate(built) if k > number and not isinstance(network, NetworkOutcome)}
     efforts = follow_alike(path, list(rest.values()), control)
     if efforts is None:
         return None

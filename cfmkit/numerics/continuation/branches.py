@@ -49,7 +49,7 @@ def enter_branch(
                 continue
             if (entered.drive - drive) * sense <= 0:
                 break  # backwards: not this side
-            if entered.unstable <= walk.here.unstable and abs(entered.drive - drive) < room:
+            if entered.unstable <= walk.current.unstable and abs(entered.drive - drive) < room:
                 return entered
     return None
 
@@ -141,7 +141,7 @@ def find_passed_end(walk: Walk, new: PathEquilibrium) -> PathEvent | Literal["un
     Who goes back from the new equilibrium along its own path comes to where the step began, or else to the path
     that the branch has joined, before its end.
     """
-    problem, current = walk.problem, walk.here
+    problem, current = walk.problem, walk.current
     back = correct(problem, new.extrapolate(current.drive), current.drive)
     moved = walk.measure_motion(new)
     if back is None:
@@ -156,7 +156,7 @@ def find_passed_end(walk: Walk, new: PathEquilibrium) -> PathEvent | Literal["un
 
 def _find_end_at(walk: Walk, new: PathEquilibrium) -> PathEvent | None:
     """Return the event at the end of a branch if the last step came to just behind it: the next ones are short then."""
-    problem, current = walk.problem, walk.here
+    problem, current = walk.problem, walk.current
     if abs(new.drive - current.drive) > SHORT_STEP * walk.options.span:
         return None
     for share in LOOK_AHEAD:
@@ -180,8 +180,8 @@ def find_joined_path(walk: Walk, fold: Located, unstable: int) -> tuple[PathEqui
     None if the fold is none: no path as stable goes on there that was less stable before.
     """
     problem, span, sense = walk.problem, walk.options.span, walk.sense
-    _, modes = problem.modes(fold.near, 1)
-    slope = primary_slope(problem, fold.near, modes)
+    _, modes = problem.modes(fold.nearest, 1)
+    slope = primary_slope(problem, fold.nearest, modes)
     for share in LOOK_AHEAD:
         ahead = sense * share * span
         guess = fold.x + ahead * slope

@@ -49,14 +49,14 @@ def pass_fold(walk: Walk, move: ArcMove, fold: Located | None = None, after: int
                 continue
             if located is not None:
                 passed_fold = located[0]
-                yield PathEvent("limit point", passed_fold.drive, step.old.unstable, located[1], passed_fold.near)
+                yield PathEvent("limit point", passed_fold.drive, step.old.unstable, located[1], passed_fold.nearest)
         elif step.new.unstable != step.old.unstable:
             spot = locate_stability_change_on_arc(problem, step, options.span)
             if spot is None and step.length > shortest:
                 arc = follow_arc(problem, step.old, step.tangent_before, 0.2 * step.length, options)
                 continue
             drive = spot.drive if spot else step.new.drive
-            yield PathEvent("bifurcation", drive, step.old.unstable, step.new.unstable, spot.near if spot else None)
+            yield PathEvent("bifurcation", drive, step.old.unstable, step.new.unstable, spot.nearest if spot else None)
         point: Point | None = None
         for point in _pass_values(walk, run, step, passed_fold):
             yield point
@@ -76,7 +76,7 @@ def pass_fold(walk: Walk, move: ArcMove, fold: Located | None = None, after: int
         if steady >= STEADY_STEPS and step.new.unstable <= begin.unstable:
             ahead = next(number for number in run if (walk.targets[number] - step.new.drive) * sense > 0)
             return walk._replace(number=ahead).restart(step.new, change)
-    return PathStop(WhyStopped.LOST, walk.here.drive, "the path was lost along its arc at {place}")
+    return PathStop(WhyStopped.LOST, walk.current.drive, "the path was lost along its arc at {place}")
 
 
 def _run_of_targets(walk: Walk) -> range:
@@ -134,7 +134,7 @@ FINEST_RETRY = 1e-4  # of the first step, where a fold is none
 
 def follow_by_arc(walk: Walk, fineness: float = 1.0) -> Items:
     """Follow a path by its arc length from here; None if that leads nowhere."""
-    problem, options, begin = walk.problem, walk.options, walk.here
+    problem, options, begin = walk.problem, walk.options, walk.current
     if not np.isfinite(begin.rate).all():
         return None
     along = np.append(begin.rate, 1.0) * walk.sense
@@ -202,7 +202,7 @@ def _end_at_fold(
             return walk.restart(move.old, abs(move.new.drive - move.old.drive), same_piece=True)
     if walk.turns_at(fold.drive):
         goal = float(walk.targets[walk.number])
-        yield Point(fold.near._replace(drive=goal, unstable=begin.unstable), walk.number, walk.branch)
+        yield Point(fold.nearest._replace(drive=goal, unstable=begin.unstable), walk.number, walk.branch)
         yield _nothing_lost(fold, begin)
         walk = walk._replace(number=walk.number + 1)
         return walk.restart(move.old, abs(move.new.drive - move.old.drive), same_piece=True)
@@ -226,7 +226,7 @@ def _end_at_fold(
 
 def _nothing_lost(fold: Located, begin: PathEquilibrium) -> PathEvent:
     """Return the event at a bifurcation where the drive turns back: stability is neither lost nor gained."""
-    return PathEvent("bifurcation", fold.drive, begin.unstable, begin.unstable, fold.near)
+    return PathEvent("bifurcation", fold.drive, begin.unstable, begin.unstable, fold.nearest)
 
 
 def _stop_at_limit_point(walk: Walk, begin: PathEquilibrium, fold: Located) -> Items:
@@ -250,8 +250,8 @@ def _last_before(problem: ContinuationProblem, begin: PathEquilibrium, fold: Loc
 
     A location may close in from behind: then it is the other one at that drive.
     """
-    last: PathEquilibrium | None = fold.near
-    if fold.near.unstable > begin.unstable:
-        last = correct(problem, 2 * fold.x - fold.near.x, fold.near.drive)
+    last: PathEquilibrium | None = fold.nearest
+    if fold.nearest.unstable > begin.unstable:
+        last = correct(problem, 2 * fold.x - fold.nearest.x, fold.nearest.drive)
     valid = last is not None and last.unstable == begin.unstable and (last.drive - fold.before.drive) * sense > 0
     return last if last is not None and valid else fold.before

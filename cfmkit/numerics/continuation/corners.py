@@ -31,7 +31,7 @@ def is_bent(first: PathEquilibrium, last: PathEquilibrium, steepest: float) -> b
 
 def crosses_bend(walk: Walk, new: PathEquilibrium) -> bool:
     """Return True if a step leads over a bend and is too long to tell a corner from a smooth curve."""
-    longest, current = walk.options.longest_bend, walk.here
+    longest, current = walk.options.longest_bend, walk.current
     if not longest or new.unstable != current.unstable or abs(new.drive - current.drive) <= longest:
         return False
     return is_bent(current, new, walk.steepest)

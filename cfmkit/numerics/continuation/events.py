@@ -36,7 +36,7 @@ class Located(NamedTuple):
 
     x: FloatArray
     drive: float
-    near: PathEquilibrium  # the nearest sample
+    nearest: PathEquilibrium  # of the samples
     before: PathEquilibrium  # on both sides
     behind: PathEquilibrium
     share: float  # of the way between the first two
@@ -45,7 +45,7 @@ class Located(NamedTuple):
 
     def as_bifurcation(self, before: int, after: int, modes: Any = None) -> PathEvent:
         """Return the event between two numbers of unstable directions."""
-        return PathEvent("bifurcation", self.drive, before, after, self.near, modes, self.within)
+        return PathEvent("bifurcation", self.drive, before, after, self.nearest, modes, self.within)
 
 
 class _Sample(NamedTuple):
@@ -160,7 +160,7 @@ def locate_loss(walk: Walk, new: PathEquilibrium) -> Located | None:
     Where an imperfection may round a bifurcation it is looked for by as short a step; if the path with the unstable
     directions is another there, the last equilibrium that is stable stands for it, where the path would be without it.
     """
-    problem, old, widest = walk.problem, walk.here, walk.options.corner * walk.options.span or np.inf
+    problem, old, widest = walk.problem, walk.current, walk.options.corner * walk.options.span or np.inf
     begin = walk.origin.drive
     narrowest = min(ONE_LOSS * abs(new.drive - begin), 1e-3 * abs(old.drive - begin) + 1e-12 * walk.options.span)
     for _ in range(MAX_HALVINGS):
@@ -171,7 +171,7 @@ def locate_loss(walk: Walk, new: PathEquilibrium) -> Located | None:
         middle = correct(problem, hermite(old, new, drive), drive)
         if middle is None:
             break
-        old, new = (middle, new) if middle.unstable == walk.here.unstable else (old, middle)
+        old, new = (middle, new) if middle.unstable == walk.current.unstable else (old, middle)
     if not walk.options.corner:
         return locate_stability_change(problem, old, new)
     if abs(new.drive - old.drive) > widest:
@@ -199,8 +199,8 @@ def relocate(
 
     None if it is not there: the path is another then.
     """
-    if event.kind == "limit point" and event.near is not None:
-        lifted = event.near._replace(x=lift(event.near.x), rate=lift(event.near.rate))
+    if event.kind == "limit point" and event.nearest is not None:
+        lifted = event.nearest._replace(x=lift(event.nearest.x), rate=lift(event.nearest.rate))
         along = np.append(lifted.rate, 1.0)
         row = arc_weights(problem, span) * along / np.linalg.norm(along)
         moved = correct(problem, lifted.x, lifted.drive, Border(row, float(row @ lifted.place)))

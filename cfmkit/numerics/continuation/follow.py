@@ -89,7 +89,7 @@ def follow_together(
     at_first = int(len(targets) > 0 and targets[0] == start.drive)
     step, steepest = options.first_step * options.span, max(0.0, abs(start.stiffness))
     walk = Walk(problem, options, targets, start, step, at_first, trail=(start,), branch=branch, steepest=steepest)
-    return limit_points(_items(walk), options.most_points)
+    return limit_points(_follow_from_start(walk), options.most_points)
 
 
 def limit_points(items: Iterable[Any], most: int) -> Iterator[Any]:
@@ -107,8 +107,9 @@ def limit_points(items: Iterable[Any], most: int) -> Iterator[Any]:
                 return
 
 
-def _items(walk: Walk) -> Iterator[Item | MarchedSteps]:
-    problem, options, start = walk.problem, walk.options, walk.here
+def _follow_from_start(walk: Walk) -> Iterator[Item | MarchedSteps]:
+    """Yield the items of a path: one march if nothing happens, else from a start that may be critical or unstable."""
+    problem, options, start = walk.problem, walk.options, walk.current
     march_whole = getattr(problem, "march_whole", None)
     if march_whole is not None and not walk.done and not start.unstable:
         marched = march_whole(walk, (CRITICAL_STIFFNESS, NEARLY_CRITICAL))
@@ -120,12 +121,12 @@ def _items(walk: Walk) -> Iterator[Item | MarchedSteps]:
     beyond = None if walk.done or options.branch == "primary" else start_critical(walk)
     # at a critical start it is rounding how many directions are unstable
     yield Point(
-        start if beyond is None else start._replace(unstable=beyond.here.unstable), walk.number - 1, walk.branch
+        start if beyond is None else start._replace(unstable=beyond.current.unstable), walk.number - 1, walk.branch
     )
     walk = beyond or walk
-    if walk.here.drive != start.drive:
-        yield Point(walk.here, -1, walk.branch)
-    elif walk.here.unstable and options.branch != "primary" and not walk.done:
+    if walk.current.drive != start.drive:
+        yield Point(walk.current, -1, walk.branch)
+    elif walk.current.unstable and options.branch != "primary" and not walk.done:
         moved = None if options.branch == "stop" else start_unstable(walk)
         if moved is None:
             yield PathStop(WhyStopped.JUMPS, start.drive, "no stable equilibrium at the start, {place}")
@@ -141,7 +142,7 @@ def follow_on(walk: Walk) -> Iterator[Item | MarchedSteps]:
         yield outcome
         return
     yield from _look_ahead(outcome)
-    yield PathStop(WhyStopped.COMPLETE, outcome.here.drive)
+    yield PathStop(WhyStopped.COMPLETE, outcome.current.drive)
 
 
 def _walk_on(walk: Walk) -> Generator[Point | PathEvent | MarchedSteps, None, Walk | PathStop]:
@@ -149,50 +150,50 @@ def _walk_on(walk: Walk) -> Generator[Point | PathEvent | MarchedSteps, None, Wa
     march = getattr(walk.problem, "march", None)
     while not walk.done:
         if march is not None and walk.rejections == 0:
-            walk = yield from _march(walk, march)
+            walk = yield from _take_march(walk, march)
             if walk.done:
                 break
         outcome = yield from _step(walk)
         if outcome is None or isinstance(outcome, PathStop):
-            return outcome or PathStop(WhyStopped.LOST, walk.here.drive, "no step converged at {place}")
+            return outcome or PathStop(WhyStopped.LOST, walk.current.drive, "no step converged at {place}")
         walk = outcome
     return walk
 
 
 def _look_ahead(walk: Walk) -> Iterator[PathEvent]:
     """Yield a bifurcation that the last requested value is at: it may be found only from a little further on."""
-    here, problem = walk.here, walk.problem
+    current, problem = walk.current, walk.problem
     is_stiff = getattr(problem, "is_stiff", None)
-    if walk.before is None or (is_stiff is not None and is_stiff(here, NEARLY_CRITICAL)):
+    if walk.before is None or (is_stiff is not None and is_stiff(current, NEARLY_CRITICAL)):
         return
-    sense = 1.0 if here.drive >= walk.before.drive else -1.0
-    beyond = np.append(walk.targets, here.drive + sense * AT_EVENT * walk.options.span)
+    sense = 1.0 if current.drive >= walk.before.drive else -1.0
+    beyond = np.append(walk.targets, current.drive + sense * AT_EVENT * walk.options.span)
     for item in _walk_on(walk._replace(targets=beyond, rejections=0)):
         if isinstance(item, PathEvent) and item.kind == "bifurcation":
             yield item
 
 
-def _march(walk: Walk, march: Callable[[Walk], MarchedSteps]) -> Generator[MarchedSteps, None, Walk]:
+def _take_march(walk: Walk, march: Callable[[Walk], MarchedSteps]) -> Generator[MarchedSteps, None, Walk]:
     """Yield the points of steps that a problem takes by itself, as far as nothing happens; return the walk there."""
     marched = march(walk)
     if len(marched.drive):
         yield marched
-        last = marched.point_at(-2) if len(marched.drive) > 1 else walk.here
+        last = marched.point_at(-2) if len(marched.drive) > 1 else walk.current
         number = walk.number + int(np.count_nonzero(marched.target >= 0))
-        walk = walk._replace(before=last, here=marched.point_at(-1), trail=(*walk.trail, marched), number=number)
+        walk = walk._replace(before=last, current=marched.point_at(-1), trail=(*walk.trail, marched), number=number)
     return walk._replace(step=marched.step, rejections=ARC_AFTER if marched.stuck else 1)
 
 
 def _step(walk: Walk) -> Items:
     """Take one step by the drive, or whatever is done instead."""
-    here, sense = walk.here, walk.sense
+    current, sense = walk.current, walk.sense
     if _is_locked(walk):
-        return PathStop(WhyStopped.LIMIT_POINT, here.drive, LOCKED_MESSAGE)
-    if walk.before is not None and (here.drive - walk.before.drive) * sense < 0:  # the drive turns back
+        return PathStop(WhyStopped.LIMIT_POINT, current.drive, LOCKED_MESSAGE)
+    if walk.before is not None and (current.drive - walk.before.drive) * sense < 0:  # the drive turns back
         walk = walk._replace(before=None)
     target = float(walk.targets[walk.number])
-    lands = abs(target - here.drive) <= LANDING_STRETCH * walk.step
-    goal = target if lands else here.drive + sense * walk.step
+    lands = abs(target - current.drive) <= LANDING_STRETCH * walk.step
+    goal = target if lands else current.drive + sense * walk.step
     trial = advance(walk, goal)
     if trial.excess > 1:
         return _shorten_for_forces(walk, goal, trial.excess)
@@ -200,37 +201,37 @@ def _step(walk: Walk) -> Items:
         return (yield from _reject(walk, goal))
     walk = walk._replace(rejections=max(0, walk.rejections - 1))
     if crosses_bend(walk, trial.new):
-        return walk.shorten(0.5 * abs(goal - here.drive), penalty=0)
-    if trial.new.unstable > here.unstable and walk.options.branch != "primary":
+        return walk.shorten(0.5 * abs(goal - current.drive), penalty=0)
+    if trial.new.unstable > current.unstable and walk.options.branch != "primary":
         outcome = yield from lose_stability(walk, trial.new)
-        return outcome if outcome is not None else walk.shorten(0.25 * abs(goal - here.drive))._replace(before=None)
+        return outcome if outcome is not None else walk.shorten(0.25 * abs(goal - current.drive))._replace(before=None)
     return (yield from _accept(walk, trial, goal, lands))
 
 
 def _is_locked(walk: Walk) -> bool:
     if walk.step > LOCKED_STEP * walk.options.span:
         return False
-    forces = (np.abs(walk.here.x) / walk.problem.unit)[~walk.problem.motions]
+    forces = (np.abs(walk.current.x) / walk.problem.unit)[~walk.problem.motions]
     return bool(forces.max(initial=0.0) > LOCKED_FORCE)
 
 
 def _skips(walk: Walk, new: PathEquilibrium) -> bool:
     """Return True if a long step has passed several bifurcations: they are passed one by one."""
-    passed = new.unstable - walk.here.unstable
+    passed = new.unstable - walk.current.unstable
     several = abs(passed) > 1 if walk.options.branch == "primary" else passed > 1
-    return several and abs(new.drive - walk.here.drive) > walk.options.cluster * walk.options.span
+    return several and abs(new.drive - walk.current.drive) > walk.options.cluster * walk.options.span
 
 
 def _accept(walk: Walk, trial: Trial, goal: float, lands: bool) -> Items:
     """Yield a step's point and what has happened on it; return the walk there."""
-    here, new = walk.here, trial.new
+    current, new = walk.current, trial.new
     assert new is not None
-    step = abs(goal - here.drive)
-    if new.unstable != here.unstable:
-        found, lost = locate_loss(walk, new), new.unstable - here.unstable
-        modes = walk.problem.modes(found.near, lost)[1] if found and lost > 0 else None
-        event = PathEvent("bifurcation", new.drive, here.unstable, new.unstable)
-        event = found.as_bifurcation(here.unstable, new.unstable, modes) if found else event
+    step = abs(goal - current.drive)
+    if new.unstable != current.unstable:
+        location, lost = locate_loss(walk, new), new.unstable - current.unstable
+        modes = walk.problem.modes(location.nearest, lost)[1] if location and lost > 0 else None
+        event = PathEvent("bifurcation", new.drive, current.unstable, new.unstable)
+        event = location.as_bifurcation(current.unstable, new.unstable, modes) if location else event
         yield event
         if abs(new.drive - event.drive) <= AT_EVENT * walk.options.span:  # the slope there is that of a mode
             _, critical = walk.problem.modes(new, abs(lost))
@@ -241,7 +242,7 @@ def _accept(walk: Walk, trial: Trial, goal: float, lands: bool) -> Items:
             return walk.shorten(0.5 * step)._replace(before=None)
         if end is not None and lands and walk.turns_at(end.drive):
             yield Point(new, walk.number, walk.branch)
-            yield PathEvent("bifurcation", end.drive, new.unstable, new.unstable, end.near)
+            yield PathEvent("bifurcation", end.drive, new.unstable, new.unstable, end.nearest)
             return walk._replace(number=walk.number + 1, before=None)
         if end is not None:
             yield end
@@ -264,26 +265,26 @@ def _shorten_for_forces(walk: Walk, goal: float, excess: float) -> Walk:
 
     Counted as one it would send slender columns into the arc length at rest, over a sharp corner.
     """
-    step = abs(goal - walk.here.drive) * max(FORCE_MARGIN / excess, 1e-4)
+    step = abs(goal - walk.current.drive) * max(FORCE_MARGIN / excess, 1e-4)
     short = step < SHORT_STEP * walk.options.span
     return walk._replace(step=step, before=None, rejections=walk.rejections + short)
 
 
 def _reject(walk: Walk, goal: float) -> Items:
     """Go on after a step that failed: behind a bifurcation that is here, by a shorter step, by the arc length."""
-    options, here = walk.options, walk.here
-    if walk.rejections >= 2 and walk.searched is not here and not options.corner:  # else steps are cut at a bend
-        walk = walk._replace(searched=here)
+    options, current = walk.options, walk.current
+    if walk.rejections >= 2 and walk.searched is not current and not options.corner:  # else steps are cut at a bend
+        walk = walk._replace(searched=current)
         outcome = yield from look_past(walk, goal)
         if outcome is not None:
             return outcome
-    walk = walk.shorten(0.5 * abs(goal - here.drive))
+    walk = walk.shorten(0.5 * abs(goal - current.drive))
     if walk.rejections > ARC_AFTER:
-        steep = largest_motion(walk.problem, here.rate) * options.span > STEEP_SLOPE
+        steep = largest_motion(walk.problem, current.rate) * options.span > STEEP_SLOPE
         if steep or walk.rejections > ARC_ANYWAY:
             outcome = yield from follow_by_arc(walk)
             if outcome is not None:
                 return outcome
     if walk.step < options.finest_step * options.span or walk.rejections > MAX_REJECTIONS:
-        return PathStop(WhyStopped.LOST, here.drive, "no step converged at {place}")
+        return PathStop(WhyStopped.LOST, current.drive, "no step converged at {place}")
     return walk

@@ -50,15 +50,15 @@ FIRST_STEP_BELOW = 0.01  # share of the range, from a stable equilibrium below a
 
 def lose_stability(walk: Walk, new: PathEquilibrium) -> Items:
     """Go on behind a loss of stability between here and a new equilibrium of the same path; None if it is another."""
-    problem, options, current = walk.problem, walk.options, walk.here
+    problem, options, current = walk.problem, walk.options, walk.current
     loss = locate_loss(walk, new)
     if loss is None:
         return None
     far = _well_before(walk, loss.drive, FARTHER_BACK * abs(loss.drive - walk.origin.drive)) or current
     slope = (loss.x - far.x) / (loss.drive - far.drive) if loss.drive != far.drive else current.rate
-    modes, after = problem.modes(loss.near, 1)[1], current.unstable + 1
+    modes, after = problem.modes(loss.nearest, 1)[1], current.unstable + 1
     if options.branch == "primary":
-        modes = problem.modes(loss.near, max(1, new.unstable - current.unstable))[1]
+        modes = problem.modes(loss.nearest, max(1, new.unstable - current.unstable))[1]
         yield loss.as_bifurcation(current.unstable, new.unstable, modes)
         walk = yield from _reach_bifurcation(walk, loss, far, slope)
 
@@ -99,10 +99,10 @@ def _find_rounded_corner(walk: Walk, loss: Located, onto: PathEquilibrium) -> Pa
     first, drive = _well_before(walk, loss.drive, abs(width)) or walk.origin, loss.drive - width
     if (drive - first.drive) * width > 0:
         before = correct(problem, first.extrapolate(drive), drive)
-        first = first if before is None or before.unstable > walk.here.unstable else before
+        first = first if before is None or before.unstable > walk.current.unstable else before
     distance = onto.drive - loss.drive
     goal = loss.drive + min(max(BESIDE_CORNER * distance, width, key=abs), distance, key=abs)
-    beside = find_beside(problem, loss.x, loss.drive, onto, goal, walk.here.unstable)
+    beside = find_beside(problem, loss.x, loss.drive, onto, goal, walk.current.unstable)
     last = beside if np.isfinite(beside.effort) else correct(problem, beside.x, goal)
     return None if last is None else corner_between(first, last)
 
@@ -132,7 +132,7 @@ def _pass_together(
     walk: Walk, new: PathEquilibrium, loss: Located, slope: FloatArray, widths: tuple[float, ...]
 ) -> tuple[PathEquilibrium, FloatArray, int] | None:
     """Return an equilibrium behind several bifurcations, their modes, and how many directions are unstable there."""
-    problem, current = walk.problem, walk.here
+    problem, current = walk.problem, walk.current
     for width in widths:
         ahead = walk.sense * width
         saddle = correct(problem, loss.x + ahead * slope, loss.drive + ahead)
@@ -141,7 +141,7 @@ def _pass_together(
         onto = descend(problem, saddle, walk.options.sign)
         if onto is None or onto.unstable > current.unstable or not opens_at(problem, loss.x, loss.drive, onto):
             continue
-        return onto, problem.modes(loss.near, saddle.unstable - current.unstable)[1], saddle.unstable
+        return onto, problem.modes(loss.nearest, saddle.unstable - current.unstable)[1], saddle.unstable
     return None
 
 
@@ -149,7 +149,7 @@ def _reach_bifurcation(
     walk: Walk, loss: Located, far: PathEquilibrium, slope: FloatArray
 ) -> Generator[Point, None, Walk]:
     """Yield the requested values before a bifurcation, on the path itself; return the walk with the next one."""
-    problem, unstable = walk.problem, walk.here.unstable
+    problem, unstable = walk.problem, walk.current.unstable
 
     def solve_before(goal: float) -> PathEquilibrium:
         guess = loss.x + (goal - loss.drive) * slope
@@ -165,7 +165,7 @@ def _reach_bifurcation(
 
 def _begin_branch(walk: Walk, loss: Located, onto: PathEquilibrium, after: int) -> Generator[Point, None, Walk]:
     """Yield the first points of a branch; return the walk on it."""
-    problem, unstable = walk.problem, walk.here.unstable
+    problem, unstable = walk.problem, walk.current.unstable
     walk = walk._replace(branch=PathBranch(loss.drive, walk.options.sign), modes=after - unstable)
 
     def solve_beside(goal: float) -> PathEquilibrium:
@@ -178,7 +178,7 @@ def _begin_branch(walk: Walk, loss: Located, onto: PathEquilibrium, after: int) 
 
 def look_past(walk: Walk, goal: float) -> Items:
     """Go on behind a bifurcation that lies at here or at the goal, where no step succeeds; None if there is none."""
-    problem, span, current = walk.problem, walk.options.span, walk.here
+    problem, span, current = walk.problem, walk.options.span, walk.current
     far, primary = (
         _well_before(walk, current.drive, LOOK_PAST_FROM * span) or walk.origin,
         walk.options.branch == "primary",
@@ -193,7 +193,7 @@ def look_past(walk: Walk, goal: float) -> Items:
                 and (past.unstable > current.unstable or (primary and past.unstable != current.unstable))
                 and largest_motion(problem, past.x - guess) < LOOK_PAST_MISS
             ):
-                return (yield from lose_stability(walk._replace(here=far), past))
+                return (yield from lose_stability(walk._replace(current=far), past))
     return None
 
 
@@ -204,7 +204,7 @@ def start_critical(walk: Walk) -> Walk | None:
     If it does so to none, the drive relieves the structure: the path goes on along the slope without the mode. How many
     directions are unstable at the start is rounding.
     """
-    problem, start = walk.problem, walk.here
+    problem, start = walk.problem, walk.current
     is_stiff = getattr(problem, "is_stiff", None)
     if is_stiff is not None and is_stiff(start, CRITICAL_STIFFNESS):
         return None
@@ -222,10 +222,10 @@ def start_critical(walk: Walk) -> Walk | None:
             if not walk.targets_up_to(step.new.drive):
                 return walk.restart(step.new, abs(step.new.drive - start.drive))
     relieved = start._replace(rate=primary_slope(problem, start, modes), unstable=start.unstable - int(values[0] < 0))
-    return walk._replace(here=relieved, trail=(relieved,))
+    return walk._replace(current=relieved, trail=(relieved,))
 
 
 def start_unstable(walk: Walk) -> Walk | None:
     """Return the walk at a stable equilibrium below an unstable start, or None."""
-    onto = descend(walk.problem, walk.here, walk.options.sign)
+    onto = descend(walk.problem, walk.current, walk.options.sign)
     return None if onto is None else walk.restart(onto, FIRST_STEP_BELOW * walk.options.span)

@@ -105,7 +105,7 @@ class PathEvent:
     drive: float
     before: int
     after: int
-    near: PathEquilibrium | None = None
+    nearest: PathEquilibrium | None = None  # equilibrium beside it
     modes: Any = None  # (n, k) critical ones, if they were computed
     within: tuple[PathEquilibrium, PathEquilibrium] | None = None  # equilibria on both sides, of one path
 
@@ -171,7 +171,7 @@ class Walk(NamedTuple):
     problem: ContinuationProblem
     options: Options
     targets: FloatArray
-    here: PathEquilibrium
+    current: PathEquilibrium  # the last one
     step: float
     number: int = 0  # of the next requested value
     before: PathEquilibrium | None = None  # on the same smooth piece, for the predictor
@@ -185,7 +185,7 @@ class Walk(NamedTuple):
     @property
     def sense(self) -> float:
         """Sign of the way to the next requested value."""
-        return 1.0 if self.targets[self.number] >= self.here.drive else -1.0
+        return 1.0 if self.targets[self.number] >= self.current.drive else -1.0
 
     @property
     def origin(self) -> PathEquilibrium:
@@ -211,16 +211,16 @@ class Walk(NamedTuple):
         trail = (*self.trail, new)
         steepest = max(self.steepest, abs(new.stiffness))
         number = self.number + reached
-        return self._replace(before=self.here, here=new, trail=trail, number=number, steepest=steepest)
+        return self._replace(before=self.current, current=new, trail=trail, number=number, steepest=steepest)
 
     def restart(self, new: PathEquilibrium, step: float, same_piece: bool = False) -> Walk:
         """Return the walk at an equilibrium from which the slope alone predicts."""
         trail = (*self.trail, new) if same_piece else (new,)
-        return self._replace(before=None, here=new, step=step, trail=trail, rejections=0)
+        return self._replace(before=None, current=new, step=step, trail=trail, rejections=0)
 
     def shorten(self, step: float, penalty: int = 2) -> Walk:
         """Return the walk with a shorter step after a rejected one."""
-        keep = self.before is not None and step >= 0.25 * abs(self.here.drive - self.before.drive)
+        keep = self.before is not None and step >= 0.25 * abs(self.current.drive - self.before.drive)
         return self._replace(step=step, before=self.before if keep else None, rejections=self.rejections + penalty)
 
     def turns_at(self, drive: float) -> bool:
@@ -254,4 +254,4 @@ class Walk(NamedTuple):
 
     def measure_motion(self, new: PathEquilibrium) -> float:
         """Return the largest motion between here and another equilibrium."""
-        return largest_motion(self.problem, new.x - self.here.x)
+        return largest_motion(self.problem, new.x - self.current.x)

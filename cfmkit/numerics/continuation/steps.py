@@ -107,7 +107,7 @@ def predict(walk: Walk, goal: float) -> FloatArray:
 
     A problem may have a method `predict(at, goal)` that knows better, and returns None if it does not.
     """
-    current, before = walk.here, walk.before
+    current, before = walk.current, walk.before
     predict_unknowns = getattr(walk.problem, "predict", None)
     guess: FloatArray | None = None if predict_unknowns is None else predict_unknowns(current, goal)
     if guess is not None:
@@ -121,7 +121,7 @@ def advance(walk: Walk, goal: float) -> Trial:
     """Try a step by the drive to a goal."""
     guess, options = predict(walk, goal), walk.options
     new = correct(walk.problem, guess, goal)
-    return judge(walk.problem, walk.here, new, guess, (options.largest_motion, options.largest_force))
+    return judge(walk.problem, walk.current, new, guess, (options.largest_motion, options.largest_force))
 
 
 def judge(

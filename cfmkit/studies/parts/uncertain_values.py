@@ -229,11 +229,11 @@ def together(block: Sensitivity, paths: Sequence[str]) -> tuple[tuple[int, ...],
 
 
 def _expand(spec: Spec, path: str, stated: tuple[str, str] | Tolerance) -> list[Parameter]:
-    return [_read_parameter(spec, item, stated) for item in _items(spec, path)]
+    return [_read_parameter(spec, item, stated) for item in _list_paths(spec, path)]
 
 
-def _items(spec: Spec, path: str) -> list[str]:
-    """Return the paths that one with a star stands for."""
+def _list_paths(spec: Spec, path: str) -> list[str]:
+    """Return the paths of the parameters that a path stands for: with a star those of all items of a list."""
     before, star, after = path.partition(f".{ALL_ITEMS}")
     if not star:
         return [path]
@@ -243,7 +243,7 @@ def _items(spec: Spec, path: str) -> list[str]:
         values = None
     if not isinstance(values, tuple):
         raise CannotVary(f"{before!r} is not a list in this specification; leave the star out")
-    return [item for index in range(len(values)) for item in _items(spec, f"{before}.{index}{after}")]
+    return [item for index in range(len(values)) for item in _list_paths(spec, f"{before}.{index}{after}")]
 
 
 def _read_parameter(spec: Spec, path: str, stated: tuple[str, str] | Tolerance) -> Parameter:
