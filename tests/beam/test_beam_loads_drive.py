@@ -125,6 +125,11 @@ def test_where_it_snaps_is_told_as_a_factor_and_as_a_force(rise):
         ("  factor: 1\n", "", "the key 'factor' is missing"),
         ("factor: 1", "factor: 0", "must not be 0"),
         ("fx: -0.1 N, fy: -0.3 N", "", "every load is zero"),
+        (
+            FORCE,
+            f"{FORCE}, {{kind: point, node: tip, fx: 0.1 N, fy: 0.1 N}}, {{kind: point, node: tip, fy: 0.2 N}}",
+            "they cancel",
+        ),
         ("kind: point, node: tip", "kind: point, node: top", "there is no node 'top'"),
         ("kind: loads, node: tip", "kind: loads, node: root", "cannot move"),
     ],
@@ -133,6 +138,12 @@ def test_what_is_wrong_is_said_at_its_place(old, new, reported):
     with pytest.raises(SpecError) as caught:
         loaded(FORCE, factor=1, more=[(old, new)])
     assert reported in str(caught.value)
+
+
+@pytest.mark.parametrize("rest", ["moment: 1 N*mm", "follows: true"])
+def test_loads_that_cancel_but_for_a_moment_or_while_they_turn_drive_the_mechanism(rest):
+    opposite = f"{{kind: point, node: tip, fx: 0.1 N, fy: 0.3 N, {rest}}}"
+    assert loaded(FORCE, opposite).status is Status.COMPLETE
 
 
 PLACES = (

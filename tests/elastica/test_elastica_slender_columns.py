@@ -17,6 +17,7 @@ from scipy.optimize import brentq, root
 from scipy.special import ellipe, ellipk
 
 import cfmkit.elastica as el
+from cfmkit.elastica.mechanics.compiled_module import WITHOUT_C_VARIABLE
 
 RNG = np.random.default_rng(0)
 
@@ -125,6 +126,22 @@ def test_a_slender_column_that_does_not_stretch_leaves_its_nearly_rigid_start(
     assert loaded.status is el.PathStatus.COMPLETE, loaded.message
     moved = loaded.motion("b")[loaded.at_requested, 0]
     np.testing.assert_allclose(moved, -pressed.drive[pressed.at_requested][1:], rtol=2e-4)
+
+
+@pytest.mark.parametrize("share", [2.5e-4, 5e-4, 1e-3])
+@pytest.mark.parametrize("engine", ["C if there is one", "numpy"])
+def test_a_nearly_rigid_start_does_not_depend_on_rounding(
+    engine: str, share: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A bow of 2e-7 of the length or more: rounding of places over the bow's square is a small force."""
+    if engine == "numpy":
+        monkeypatch.setenv(WITHOUT_C_VARIABLE, "1")
+    network, rigidity = strip(5000, "pinned", axial=False)
+    control = el.Control(imperfection=share * 0.1 * math.sqrt(12) / 5000)
+    pressed = el.trace(network, el.Displacement("b", np.pi, np.array([0.015])), control)
+    assert pressed.status is el.PathStatus.COMPLETE, pressed.message
+    ratio, _ = elastica(0.15)
+    assert pressed.effort[-1] == pytest.approx(ratio * np.pi**2 * rigidity / 0.01, rel=1e-5)
 
 
 @pytest.mark.parametrize("ends", ["pinned", "clamped"])

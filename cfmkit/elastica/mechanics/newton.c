@@ -8,7 +8,7 @@
 #include "march.h"
 
 #define LARGEST_CORRECTION 50.0 /* of a motion: beyond that Newton's method has left the path */
-#define STANDING 1e-10          /* motions that change by less stand: then forces may still change by 1e-3 */
+#define STANDING 1e-9           /* motions that change by less stand: then forces may still change by 1e-3 */
 #define MAX_ROUNDS 14
 
 /* Memory; with a dense matrix to hold the tangent as it is, whether it is symmetric or not. */

@@ -22,20 +22,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from cfmkit.arrays import FloatArray
-    from cfmkit.elastica.mechanics.discretise import Discretisation
     from cfmkit.elastica.results.path import EquilibriumPath
 
 DIFFERENCE_STEP = 1e-6  # of the largest unknown along the path, to either side: the motion's difference is off by 1e-10
-FORCE_ROUNDING = 30 * np.finfo(float).eps
-"""Share of the stiffest element's force for a unit motion that rounding of places leaves, with room."""
-
-
-def stiffest(mesh: Discretisation) -> float:
-    """Return the largest force on the end of an element that is moved by a unit length, dimensionless."""
-    e = mesh.elements
-    stretch = np.where(mesh.floored, 0.0, (e.weight * e.axial).sum(axis=-1))
-    bent = 12.0 / (e.weight / e.rigidity).sum(axis=-1)
-    return float(np.where(stretch > 0.0, 1.0 / np.where(stretch > 0.0, stretch, 1.0), bent).max())
+PLACE_ROUNDING = 30 * np.finfo(float).eps  # of the length of a network, with room
 
 
 def effort_error(
@@ -44,12 +34,20 @@ def effort_error(
 ) -> float:
     """Return the numerical error of a path's effort [N or N m] under a drive by a motion.
 
-    That is the estimated error of the forces, and what rounding makes of them: `ROUND_OFF` of the largest force in the
-    network, and `FORCE_ROUNDING`.
+    That is the estimated error of the forces, or `ROUND_OFF` of the largest force in the network, and what rounding of
+    places makes of the effort. A gap at an end of an element changes the effort as the drive changes the force on that
+    end (both are a second derivative of the energy). The mean of that along the path counts, at least a unit.
     """
     scales = path.mesh.scales
-    error = max(min(path.error, tolerance), ROUND_OFF) * largest_force(path.at) + FORCE_ROUNDING * stiffest(path.mesh)
+    error = max(min(path.error, tolerance), ROUND_OFF) * largest_force(path.at)
+    error += PLACE_ROUNDING * max(1.0, _mean_force_rate(path))
     return error * scales.moment / scales.drive
+
+
+def _mean_force_rate(path: EquilibriumPath) -> float:
+    """Return the largest mean change of the force on an end of an element per motion of the drive, dimensionless."""
+    forces, motion = path.at.z[:, path.mesh.elements.unknowns[:, -2:]], np.abs(np.diff(path.at.drive)).sum()
+    return float(np.abs(np.diff(forces, axis=0)).sum(axis=0).max(initial=0.0) / motion) if motion > 0 else 0.0
 
 
 def largest_member_efforts(

@@ -181,8 +181,8 @@ def _drive_faults(mechanism: Mechanism) -> Iterator[Fault]:
         if rotation:
             yield at, f"{drive.node!r} cannot turn: its support is {node.support!r}; 'pinned' lets it turn"
         return
-    if isinstance(drive, LoadsDrive) and not any(load.acts for load in drive.loads):
-        yield ("drive", "loads", "loads"), "every load is zero: nothing drives the mechanism"
+    if isinstance(drive, LoadsDrive) and not drive.acts:
+        yield ("drive", "loads", "loads"), "every load is zero, or they cancel: nothing drives the mechanism"
     if along and across:
         remedy = f"'guided' with 'direction: {format_short(drive.direction, 'angle')}'"
         yield at, f"{drive.node!r} cannot move: its support is {node.support!r}; {remedy} or 'free' lets it"

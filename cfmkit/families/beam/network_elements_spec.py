@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -29,6 +30,7 @@ from cfmkit.stock.materials import material
 
 Station = tuple[Annotated[Ratio, Field(ge=0, le=1)], PositiveLength]
 Thickness = PositiveLength | Annotated[tuple[Station, ...], Field(min_length=2)]
+LOAD_SUM_RTOL = 1e-12  # loads of which less is left, in parts of the largest, cancel
 
 HELD_MOTIONS = {
     "free": (False, False, False),
@@ -211,11 +213,6 @@ class Load(Model):
     acts_on: ClassVar[Literal["node", "beam"]]  # key of the name of that
     sizes: ClassVar[tuple[str, ...]]  # keys of its components
 
-    @property
-    def acts(self) -> bool:
-        """Whether it is not zero."""
-        return any(getattr(self, name) != 0 for name in self.sizes)
-
     @abstractmethod
     def build(self, share: float = 1.0) -> engine.LoadOn:
         """Return a share of the load as the engine has it."""
@@ -344,6 +341,19 @@ class LoadsDrive(Drive):
     reference: Annotated[Force, Field(gt=0)] = Field(
         1.0, description="force that the curve shows where the factor is one"
     )
+
+    @property
+    def acts(self) -> bool:
+        """Whether some load is left where those of one kind on one node or beam are added up."""
+        sums: dict[Any, list[Any]] = {}
+        for load in self.loads:
+            key = load.kind, getattr(load, load.acts_on), getattr(load, "follows", False)
+            sums.setdefault(key, []).append([getattr(load, name) for name in load.sizes])
+        return any(
+            abs(math.fsum(values)) > LOAD_SUM_RTOL * max(map(abs, values))
+            for loads in sums.values()
+            for values in zip(*loads, strict=True)
+        )
 
     def text(self, value: float, copies: int) -> str:
         """Return a value of the drive on one copy as a reader wants it."""
