@@ -43,13 +43,23 @@ class Call:
 class Verbs(TyperGroup):
     """The group of all verbs; each module is imported when its command is called."""
 
+    lists_verbs = False  # whether commands are made for their names and first sentences alone
+
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all verbs, in the order of the help."""
         return sorted(names(), key=lambda name: _import_verb(name).HELP_POSITION)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return one verb as a command, None if there is no such verb."""
-        return _make_command(cmd_name) if cmd_name in names() else None
+        return _make_command(cmd_name, self.lists_verbs) if cmd_name in names() else None
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the list of verbs, whose own options it does without: those of some need a second of imports."""
+        self.lists_verbs = True
+        try:
+            super().format_help(ctx, formatter)
+        finally:
+            self.lists_verbs = False
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Find the verb that the arguments begin with."""
@@ -71,13 +81,15 @@ def _import_verb(name: str) -> ModuleType:
 
 def _find_options_class(module: ModuleType) -> Any:
     """Return the class of the options that the `run` of a verb takes."""
+    if hasattr(module, "make_options"):
+        return module.make_options()
     return vars(module)[module.run.__annotations__["options"]]
 
 
-def _make_command(name: str) -> Any:
-    """Return the command of a verb: its options are the fields of what its `run` takes."""
+def _make_command(name: str, is_listed: bool) -> Any:
+    """Return the command of a verb: its options are the fields of what its `run` takes, if it is not only listed."""
     module = _import_verb(name)
-    options = module.make_options() if hasattr(module, "make_options") else _find_options_class(module)
+    options = Common if is_listed else _find_options_class(module)
 
     def callback(**values: Any) -> Call:
         return Call(module.run, options(**values))
