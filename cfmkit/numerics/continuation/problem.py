@@ -1,4 +1,4 @@
-"""What a structure must offer to a solver that follows its equilibria; an equilibrium; sizes of motions and forces."""
+"""Protocol that a structure offers to a solver which follows its equilibria; sizes of motions and forces."""
 
 from __future__ import annotations
 
