@@ -117,13 +117,13 @@ def joined_away_from_nodes(
     candidates = [*look.find_close_strips(), *look.find_strips_close_to_blocks(blocks), *look.find_close_blocks(blocks)]
     if not candidates:
         return ()
-    whole = _material_shape(contours, look.thinnest)
-    shapely.prepare(whole)
+    material = _material_shape(contours, look.thinnest)
+    shapely.prepare(material)
     joins: dict[tuple[str, str], Join] = {}
     for first, second, starts, ends, gaps in candidates:
         order = np.argsort(gaps, kind="stable")[:MAX_TRIED_LINES]
         lines = shapely.linestrings(np.stack([starts[order], ends[order]], axis=1))
-        inside = np.flatnonzero(shapely.covers(whole, lines))
+        inside = np.flatnonzero(shapely.covers(material, lines))
         if len(inside) and (first, second) not in joins:
             k = order[inside[0]]
             joins[first, second] = Join(first, second, 0.5 * (starts[k] + ends[k]), float(gaps[k]))

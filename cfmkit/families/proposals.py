@@ -113,7 +113,7 @@ class Request:
         return self.envelope[2] if len(self.envelope) > 2 else None
 
     @property
-    def strength_share(self) -> float:
+    def allowed_stress_share(self) -> float:
         """Stress that designs may have, in parts of the strength: the reserve over the safety factor.
 
         Less where a yield is required, as made parts are thicker and stiffer than drawn, and where an end stop follows,

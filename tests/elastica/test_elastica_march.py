@@ -349,8 +349,10 @@ def test_states_are_compared_with_a_higher_degree_in_c_as_in_numpy() -> None:
             (fast.ends, slow.ends),
         ]
         pairs += [(fast.effort * own.effort_unit, slow.effort)] if mesh.rate.any() else []
-        for mine, its in pairs:  # beside a bifurcation a rounding of the arrays moves a column by 3e-10
-            assert mine == pytest.approx(its, abs=1e-9 * max(np.abs(its).max(), 1.0)), case["name"]
+        # beside its bifurcation this column moves by 3e-10 for a rounding of its arrays
+        limit = 1e-9 if case["name"] == "column 3e-05 m thick, clamped" else 1e-10
+        for mine, its in pairs:
+            assert mine == pytest.approx(its, abs=limit * max(np.abs(its).max(), 1.0)), case["name"]
     assert compared > 12
 
 

@@ -250,7 +250,7 @@ def test_the_smallest_deviation_follows_its_law_down_to_a_hundred_millionth_of_t
     from cfmkit.families.slider_crank.springs.rates_for_widest_window import evaluate_window
 
     task = task_of(config("li2019", analysis={}, design={"torque": "2 N*mm", "tolerance": "0.5 %"}))
-    middle = task.assembly.stretched
+    middle = task.assembly.stretched_motion
     wide, narrow = (
         evaluate_window(task, middle - 0.5 * span, middle + 0.5 * span) for span in np.deg2rad([0.5, width])
     )

@@ -349,7 +349,7 @@ def test_links_that_yield_are_found():
 def test_a_safety_factor_is_required_of_stresses_and_leaves_less_strength_to_the_laws():
     usual = request_of({key: value for key, value in POM.items() if key != "safety"})
     assert usual.safety == 1.5
-    assert usual.strength_share == pytest.approx(request().strength_share / 1.5)
+    assert usual.allowed_stress_share == pytest.approx(request().allowed_stress_share / 1.5)
     result = cfmkit.analyze("configs/vcfm_pla.yaml")
     rows = {one["metric"]: one for one in list_requirements(usual, result, None, ())}
     assert rows["safety_factor"]["min"] == "1.5"

@@ -375,7 +375,7 @@ class WatchedProblem(NetworkProblem):
                 grown = self.piece.grow_each(some)
                 quiet = self.piece.are_quiet(grown).tolist()
                 watched = zip(some[1:], grown[1:], quiet, strict=True)
-                self._watched.update((id(at), (at, *state)) for at, *state in watched)
+                self._watched_states.update((id(at), (at, *state)) for at, *state in watched)
                 if not all(quiet):
                     break
         return marched
@@ -383,10 +383,10 @@ class WatchedProblem(NetworkProblem):
     def grow_watched(self, at: PathEquilibrium) -> tuple[PathEquilibrium, bool]:
         """Return a state with the forces of all contacts, and whether surely none changes on the step before it."""
         assert self.piece is not None
-        _, grown, is_quiet = self._watched.pop(id(at), (at, None, False))
+        _, grown, is_quiet = self._watched_states.pop(id(at), (at, None, False))
         return grown or self.piece.grow(at), is_quiet
 
     @cached_property
-    def _watched(self) -> dict[int, tuple[PathEquilibrium, PathEquilibrium, bool]]:
+    def _watched_states(self) -> dict[int, tuple[PathEquilibrium, PathEquilibrium, bool]]:
         """States of marches by their identity, with the forces of all contacts, and whether the step is quiet."""
         return {}

@@ -157,8 +157,8 @@ def find_tension(path: Path, previous: Mapping[str, float]) -> dict[str, float]:
     force = np.abs(path.at.z[:, e.unknowns[:, -2:]])
     if not _measure_tautness(path, force.max(axis=0).max(axis=1)).max() > TAUT_RATIO:
         return {}
-    whole = _measure_tautness(path, force.max(axis=2))
-    resolved = np.where(whole < MAX_TENSION, whole, 0.0).max(axis=0)
+    tautness = _measure_tautness(path, force.max(axis=2))
+    resolved = np.where(tautness < MAX_TENSION, tautness, 0.0).max(axis=0)
     for number, (beam, (left, right)) in enumerate(zip(e.beam, e.cuts, strict=True)):
         if right - left > RECUT_SHARE and resolved[number] * (right - left) > TAUT_RATIO:
             tension[beam] = max(tension.get(beam, 0.0), float(resolved[number]))

@@ -184,7 +184,7 @@ def _size_section(
     strength = material.allowable(1.0)
     if strength is None or not force > 0.0:
         return 1e9, "no strength of the material is known"
-    thicker = min(BENDING_STRESS_SHARE * request.strength_share * strength * size / (stress * stiffer), thickest)
+    thicker = min(BENDING_STRESS_SHARE * request.allowed_stress_share * strength * size / (stress * stiffer), thickest)
     wide = _width(request, kept, size, stiffer, thicker, force)
     if wide < MIN_WIDTH_RATIO * thicker * thin:
         # thinner, so that the same force wants as much width as the beam is thick
@@ -200,7 +200,7 @@ def _size_section(
     area = size**2 * kept.envelope.across * kept.envelope.along / (request.envelope[0] * request.envelope[1])
     # of made parts those with thick beams are most alike: an error of the thickness counts three times
     promise = area if request.stated.min_yield is None else -thicker * thin
-    strain = request.strength_share * strength / material.modulus
+    strain = request.allowed_stress_share * strength / material.modulus
     promise += mechanism.layers - 1.0  # one layer is easier to make than two
     promise += WIDE_LAST * is_too_wide(request, wide, thicker * thin, strain)
     variant = name_variant(f"shape {kept.name}", request, block)
@@ -264,7 +264,7 @@ def _refit(spec: BeamSpec, request: Request, model: Callable[[BeamSpec, Run], Re
     window = flattest(result, request.travel)
     if window is None:
         return None, 1.0
-    allowed = request.strength_share * (spec.mechanism.material.allowable(1.0) or np.inf)
+    allowed = request.allowed_stress_share * (spec.mechanism.material.allowable(1.0) or np.inf)
     mean, stress = mean_and_stress(result.curve, window)
     thinner = min(1.0, 0.99 * allowed / stress)
     thickness = float(spec.mechanism.thickness) * thinner  # type: ignore[arg-type]

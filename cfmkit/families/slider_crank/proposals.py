@@ -217,7 +217,7 @@ def strip_width(request: Request, block: dict[str, Any], crank: float) -> float:
         return math.inf
     size, scale = crank / 0.054, request.travel / 0.034
     stiffer = material.modulus / 1.8e9
-    thicker = request.strength_share * strength / 42.5e6 / stiffer * size**2 / scale
+    thicker = request.allowed_stress_share * strength / 42.5e6 / stiffer * size**2 / scale
     return 0.005138 * (request.target / 1.5) * size**3 / (stiffer * thicker**3 * scale)
 
 
@@ -256,7 +256,7 @@ class PrintedSize:
         """Return a part with its block `design`, which is to hold the force over a travel."""
         request, small = self.request, self.crank / FULL_PADS
         pads = {} if small >= 1.0 else {"part": {"pad": tuple(small * side for side in PAD_SIZE)}}
-        about = {"material": self.material, "safety_factor": 1.01 / request.strength_share}
+        about = {"material": self.material, "safety_factor": 1.01 / request.allowed_stress_share}
         data = {
             "family": "slider-crank",
             "name": "suggested",
@@ -358,7 +358,7 @@ def correct(spec: SliderCrankSpec, request: Request) -> SliderCrankSpec:
     flat_window, material = flattest(result, request.travel), solid.mechanism.material
     if flat_window is None or material is None:
         return solid
-    allowed = request.strength_share * (material.allowable(1.0) or np.inf)
+    allowed = request.allowed_stress_share * (material.allowable(1.0) or np.inf)
     mean, stress = mean_and_stress(result.curve, flat_window)
     thinner = min(1.0, 0.99 * allowed / stress)
     window = tuple(Place(place, "length") for place in flat_window)

@@ -301,7 +301,7 @@ def with_links(spec: SliderCrankSpec, request: Request, block: MaterialBlock) ->
     loads = _loads(spec)
     widest = min((_hole_of_coil(spec, name, loads_of) for name, loads_of in _turns_of(spec).items()), default=np.inf)
     from_material = PartStrength.from_material(material, request.safety)
-    strength = replace(from_material, allowable=min(request.strength_share * allowable, from_material.allowable))
+    strength = replace(from_material, allowable=min(request.allowed_stress_share * allowable, from_material.allowable))
     link = links_that_bear(loads, sheet, strength, request.thinnest, widest)
     if link is None:
         return None
@@ -330,7 +330,7 @@ def _least_sheet(spec: SliderCrankSpec, request: Request, block: MaterialBlock) 
     allowable = material.allowable(1.0)
     if allowable is None:
         return math.inf
-    return least_sheet(_loads(spec), material.modulus, request.strength_share * allowable)
+    return least_sheet(_loads(spec), material.modulus, request.allowed_stress_share * allowable)
 
 
 def _turns_of(spec: SliderCrankSpec) -> dict[str, float]:

@@ -263,13 +263,13 @@ class SliderPath:
 
     def _find_knee(self, travel: Any) -> tuple[Any, Any, Any]:
         """Return the knee angle at some travels, its sine and its cosine."""
-        whole = 4.0 * self.linkage.crank * self.linkage.coupler
-        square = self._square_to_stretched(travel) / whole
+        squared_span = 4.0 * self.linkage.crank * self.linkage.coupler  # x^2 stretched less that folded
+        square = self._square_to_stretched(travel) / squared_span
         share = np.sqrt(square)  # sin(psi/2)
         knee = 2.0 * np.arcsin(np.minimum(share, 1.0))
         sine, cosine = 2.0 * share * np.sqrt(1.0 - square), 1.0 - 2.0 * square
         if (is_folding := share > NEARLY_FOLDED).any():
-            rest = np.cos(0.5 * self.start) ** 2 - travel * (self.x0 + (self.x0 - travel)) / whole
+            rest = np.cos(0.5 * self.start) ** 2 - travel * (self.x0 + (self.x0 - travel)) / squared_span
             folding = math.pi - 2.0 * np.arcsin(np.sqrt(np.minimum(np.maximum(rest, 0.0), 1.0)))
             pairs = (folding, knee), (np.sin(folding), sine), (np.cos(folding), cosine)
             knee, sine, cosine = (np.where(is_folding, *pair) for pair in pairs)

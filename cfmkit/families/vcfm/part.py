@@ -329,8 +329,8 @@ def spring_contours(spec: VcfmSpec, top: float) -> list[Contour]:
     if spec.mechanism.flexures.loaded == "half":
         hollow = [(-half, inner[-1][1]), *_flip(inner), (-half, inner[0][1])] if inner else []
         return [_contour([(-half, top), (half, top), *outer, (half, low), (-half, low), *hollow])]
-    whole = _close_symmetric([(0.0, top), (half, top), *outer, (half, low), (0.0, low)])
-    return [whole, _contour([*inner, *_mirror_chain(inner)], hole=True)] if inner else [whole]
+    outline = _close_symmetric([(0.0, top), (half, top), *outer, (half, low), (0.0, low)])
+    return [outline, _contour([*inner, *_mirror_chain(inner)], hole=True)] if inner else [outline]
 
 
 def _spring_law(spec: VcfmSpec) -> LeafSpring:

@@ -137,7 +137,7 @@ def correct(spec: VcfmSpec, request: Request) -> VcfmSpec:
     if fit is None:
         return solid
     last, preloads = fit.end, solid.analysis.preloads
-    strength = request.strength_share * (solid.mechanism.material.allowable(1.0) or np.inf)
+    strength = request.allowed_stress_share * (solid.mechanism.material.allowable(1.0) or np.inf)
     longer = [max(1.0, sqrt(1.02 * fit.leaf_stress / strength)), 1.0]
     if solid.mechanism.springs is None:
         law = parts(solid).spring

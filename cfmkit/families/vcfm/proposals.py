@@ -114,7 +114,7 @@ def propose(request: Request, run: Run) -> FamilyOffer:
 def _is_too_wide(request: Request, block: MaterialBlock, sizes: DesignSizes) -> bool:
     """Return True if the Vs or the spring probably cannot curl, and stiffen by more than the band of the request."""
     material = MaterialSpec.model_validate(dict(block))
-    strain = request.strength_share * (material.allowable(1.0) or 0.0) / material.modulus
+    strain = request.allowed_stress_share * (material.allowable(1.0) or 0.0) / material.modulus
     return any(
         is_too_wide(request, float(strip.width), float(strip.thickness), strain)
         for strip in (sizes.leaf, sizes.spring_leaf)
@@ -155,7 +155,7 @@ def _designs(request: Request, material: dict[str, Any]) -> Any:
             "name": "suggested",
             "mechanism": {
                 "material": material,
-                "safety_factor": STRESS_MARGIN / request.strength_share,
+                "safety_factor": STRESS_MARGIN / request.allowed_stress_share,
                 "positive": {
                     "structure": "diamond", "length": 20.0 * thin * thicker, "angle": SPRING_ANGLE,
                     "thickness": thin * thicker, "width": 5.0 * thin,
@@ -304,7 +304,7 @@ def _with_structures(candidates: list[Candidate]) -> Iterator[Candidate]:
 
 def finish_with(name: str, spec: VcfmSpec, request: Request) -> VcfmSpec:
     """Return a designed mechanism with another structure, of `STRUCTURE_BLOCKS`."""
-    strength = request.strength_share * (spec.mechanism.material.allowable(STRESS_MARGIN) or 0.0)
+    strength = request.allowed_stress_share * (spec.mechanism.material.allowable(STRESS_MARGIN) or 0.0)
     design = spec.design
     raised = 0.0 if request.adjustable is None or design is None or not design.adjustment else max(request.adjustable)
     forces = request.target, max(raised, request.target)

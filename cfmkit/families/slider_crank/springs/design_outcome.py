@@ -98,9 +98,11 @@ def explain_impossible_slope(task: SpringTask) -> Finding:
         )
     text = "no springs with rates of zero or more have 'design.stiffness' in the stretched position within "
     text += "'design.max_rates'"
-    if task.assembly.stretched == task.assembly.start:
+    if task.assembly.stretched_motion == task.assembly.start:
         text += ": the springs are relaxed there, and only positive slopes exist"
-    elif task.goal((task.assembly.start, task.assembly.stretched)) is not None and "slider" not in wanted.springs:
+    elif (
+        task.goal((task.assembly.start, task.assembly.stretched_motion)) is not None and "slider" not in wanted.springs
+    ):
         text += ": torsion springs alone have positive slopes; use the spring at the slider"
     return finding("no_zero_stiffness", text)
 
@@ -133,7 +135,7 @@ def explain_hopeless(task: SpringTask, deviation: float) -> Finding:
         cure = "change it, its window, or the lengths in 'mechanism'"
         return _infeasible_targets(f"{text} of the largest of 'design.target'; {cure}")
     text += f": that is no constant {assembly.drive}"
-    if assembly.drive == "torque" and (assembly.stretched - assembly.start) * task.wanted.size <= 0.0:
+    if assembly.drive == "torque" and (assembly.stretched_motion - assembly.start) * task.wanted.size <= 0.0:
         text += "; the stretched position does not lie ahead of the unloaded one, and the torque only rises there; "
         text += "change 'mechanism.unloaded_angle' (or 'unloaded_offset'), or the sign of 'design.torque'"
         return finding("no_zero_stiffness", text)

@@ -106,7 +106,7 @@ def key(solution: Solution, name: str, motion: float) -> KeyPosition:
 def key_positions(solution: Solution) -> tuple[KeyPosition, ...]:
     """Return three telling positions: unloaded, stretched or unstable, and the second stable one or the last."""
     low, high = float(solution.motion[0, 0]), float(solution.motion[0, -1])
-    start, stretched = solution.assembly.start, solution.assembly.stretched
+    start, stretched = solution.assembly.start, solution.assembly.stretched_motion
     at_rest = low <= solution.assembly.rest <= high
     first = key(solution, "unloaded", start) if at_rest else key(solution, "first", low)
     unstable, stable = solution.nearest_of_one(stable=False), solution.nearest_of_one(stable=True)
@@ -197,7 +197,7 @@ def _kind(solution: Solution) -> str:
 
 def _shade_band(ax: Axes, solution: Solution) -> None:
     """Shade the constant band and name it; of a mechanism that snaps through it says nothing."""
-    if is_plain() or np.isnan(solution.band[0][0]) or solution.classified.kind[0] > NEGATIVE_CLASS:
+    if is_plain() or np.isnan(solution.band[0][0]) or solution.stability_classes.kind[0] > NEGATIVE_CLASS:
         return
     dimension = motion_scale(solution).dimension
     low, high = (float(to_border(float(end[0]), dimension)) for end in solution.band)

@@ -71,7 +71,7 @@ def _make_lock_rule(number: int, name: str) -> Rule:
 
 
 def _boundary(solution: Solution) -> Sentence:
-    kind, drop = int(solution.classified.kind[0]), float(solution.classified.drop[0])
+    kind, drop = int(solution.stability_classes.kind[0]), float(solution.stability_classes.drop[0])
     side = "has" if kind in (SNAP_THROUGH_CLASS, BISTABLE_CLASS, TRISTABLE_CLASS) else "just misses"
     return (
         f"the lowest {solution.drive} after the peak is {100 * (1 - drop):.2g} % of the peak: the "
@@ -213,11 +213,11 @@ def _leaves_out_stretched(solution: Solution) -> Any:
     if solution.window is None or solution.drive != "torque":
         return False
     low, high = solution.window
-    return ~((low <= solution.stretched) & (solution.stretched <= high))[:, 0]
+    return ~((low <= solution.stretched_motion) & (solution.stretched_motion <= high))[:, 0]
 
 
 def _describe_missing_stretched(solution: Solution) -> Sentence:
-    low, high, stretched = (deg(float(at[0, 0])) for at in (*solution.window_or_motion, solution.stretched))
+    low, high, stretched = (deg(float(at[0, 0])) for at in (*solution.window_or_motion, solution.stretched_motion))
     return (
         f"the window {low} to {high} does not contain the stretched position {stretched}: only around it is the "
         "slider's spring certain to give negative stiffness",
@@ -300,13 +300,15 @@ FINDING_RULES: tuple[Rule, ...] = (
     _make_lock_rule(1, "back"),
     FindingRule(
         "second_stable_outside",
-        lambda solution: (solution.classified.kind == SNAP_THROUGH_CLASS) & (solution.classified.unstable > 0),
+        lambda solution: (
+            (solution.stability_classes.kind == SNAP_THROUGH_CLASS) & (solution.stability_classes.unstable > 0)
+        ),
         lambda solution: (
             f"at {place_text(solution, float(solution.nearest(stable=False)[0][0]))} the mechanism snaps through, and "
             "the motion ends before the next stable position; extend the motion to find it",
         ),
     ),
-    FindingRule("class_boundary", lambda solution: np.abs(solution.classified.drop - 1.0) < DROP_TOL, _boundary),
+    FindingRule("class_boundary", lambda solution: np.abs(solution.stability_classes.drop - 1.0) < DROP_TOL, _boundary),
     FindingRule(
         "quartic_minimum",
         _is_restless,

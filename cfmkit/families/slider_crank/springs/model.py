@@ -326,7 +326,7 @@ def _slopes(solution: Solution) -> Iterator[tuple[str, FloatArray]]:
     if solution.low[0, 0] <= reference[0] <= solution.high[0, 0]:
         yield f"reference_{drive}", assembly.units(reference).effort[:, 0]
     if drive == "torque":
-        at = assembly.units(solution.stretched[0])
+        at = assembly.units(solution.stretched_motion[0])
         yield "stretched_torque", at.effort[:, 0]
         yield "stretched_stiffness", at.stiffness[:, 0]
 

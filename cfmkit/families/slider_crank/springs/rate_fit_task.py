@@ -163,7 +163,7 @@ class SpringTask:
 
     def _sloping(self, goal: RateGoal, places: FloatArray) -> RateGoal:
         """Return a goal that is a line through the stretched position."""
-        wanted, at = self.wanted, self.assembly.stretched
+        wanted, at = self.wanted, self.assembly.stretched_motion
         slope = (wanted.stiffness or 0.0) / wanted.size
         line = goal.wanted + slope * (places - at)
         if not wanted.hold_stiffness:

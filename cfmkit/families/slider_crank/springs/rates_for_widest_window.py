@@ -181,9 +181,9 @@ def _first_guess(task: SpringTask, tolerance: float) -> tuple[float, float]:
     """Return width and middle from the law for small angles, or a tenth of the motion next to its start."""
     first, last = task.searched
     assembly = task.assembly
-    lead = assembly.stretched - assembly.start
+    lead = assembly.stretched_motion - assembly.start
     if assembly.drive == "torque" and abs(lead) > 1e-6:
-        return WIDTH_OVER_LEAD * abs(lead) * (tolerance / 0.005) ** (1 / 3), assembly.stretched
+        return WIDTH_OVER_LEAD * abs(lead) * (tolerance / 0.005) ** (1 / 3), assembly.stretched_motion
     return 0.1 * (last - first), first + 0.1 * (last - first)
 
 

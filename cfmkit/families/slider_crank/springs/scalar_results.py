@@ -161,7 +161,7 @@ def _force_per_degree(solution: Solution) -> FloatArray:
 
 def _effort_drop(solution: Solution) -> FloatArray:
     is_there = np.abs(solution.effort).max(axis=1) > solution.effort_error
-    return np.where(is_there, solution.classified.drop, np.nan)
+    return np.where(is_there, solution.stability_classes.drop, np.nan)
 
 
 def _quantity_of_turn(joint: int) -> ScalarQuantity[Solution]:
@@ -187,7 +187,7 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         "text",
         "positive, zero, local negative, snap-through (the second stable position lies outside), bistable or "
         "tristable over the motion; a drop of at most twice `analysis.tolerance` counts as zero [LH, sec. 3]",
-        lambda solution: solution.classified.kind,
+        lambda solution: solution.stability_classes.kind,
         words=CLASS_NAMES,
     ),
     "stiffness_drop": ScalarQuantity(
@@ -200,12 +200,12 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
     "stable_positions": ScalarQuantity(
         "count",
         "stable equilibria in the motion, the unloaded position included",
-        lambda solution: solution.classified.stable,
+        lambda solution: solution.stability_classes.stable,
     ),
     "unstable_positions": ScalarQuantity(
         "count",
         "unstable equilibria in the motion; beyond each the mechanism snaps through",
-        lambda solution: solution.classified.unstable,
+        lambda solution: solution.stability_classes.unstable,
     ),
     **_quantity_of_equilibrium("snap_through", "first unstable", stable=False),
     **_quantity_of_equilibrium("second_stable", "next stable", stable=True),
@@ -238,14 +238,14 @@ SCALAR_QUANTITIES: Mapping[str, ScalarQuantity[Solution]] = {
         "torque",
         "torque",
         "torque in the stretched position",
-        lambda solution: solution.frictionless(solution.stretched),
+        lambda solution: solution.frictionless(solution.stretched_motion),
         "the torque is unbounded there",
     ),
     "stretched_stiffness": _quantity_of_drive(
         "torque",
         "rotational_stiffness",
         "slope of the torque in the stretched position [LH, eq. 31]",
-        lambda solution: solution.assembly.total(solution.assembly.units(solution.stretched).stiffness)[:, 0],
+        lambda solution: solution.assembly.total(solution.assembly.units(solution.stretched_motion).stiffness)[:, 0],
         "the torque is unbounded there",
     ),
     "bistable_factor": ScalarQuantity(

@@ -7,7 +7,8 @@ Equilibria, turning points and bands are searched on a fine grid, cut into monot
 form, so that they do not depend on the points of the curve.
 
 Places of the motion: `start` is the unloaded position; `rest`, where all springs are relaxed, is the same or none;
-`stretched` is the nearest with crank and coupler in line; around `reference` the band is measured, of effort `level`.
+`stretched_motion` is the nearest with crank and coupler in line; around `reference` the band is measured, of effort
+`level`.
 
 [LH] B. Li, G. Hao, Chin. J. Mech. Eng. 32 (2019) 10.1186/s10033-019-0369-z, sec. 3, 4.2 and 6.
 """
@@ -137,7 +138,7 @@ class Solution(ShortRepr):
     @property
     def class_name(self) -> str:
         """Its bistability class in words."""
-        return CLASS_NAMES[int(self.classified.kind[0])]
+        return CLASS_NAMES[int(self.stability_classes.kind[0])]
 
     def nearest_of_one(self, stable: bool) -> Equilibrium | None:
         """Return its equilibrium next to the unloaded position, of one kind; None if there is none."""
@@ -167,9 +168,9 @@ class Solution(ShortRepr):
         return self.column(lambda assembly: assembly.start)
 
     @cached_property
-    def stretched(self) -> FloatArray:
+    def stretched_motion(self) -> FloatArray:
         """The motion in the stretched position nearest to the unloaded one."""
-        return self.column(lambda assembly: assembly.stretched)
+        return self.column(lambda assembly: assembly.stretched_motion)
 
     @cached_property
     def reference(self) -> FloatArray:
@@ -295,7 +296,7 @@ class Solution(ShortRepr):
         return monotone(grid, effort, slope, self.assembly.efforts)
 
     @cached_property
-    def classified(self) -> StabilityClasses:
+    def stability_classes(self) -> StabilityClasses:
         """Classes, drops and numbers of equilibria."""
         return classify(self.curve, self.start, self.rest, self.tolerance, self.window)
 

@@ -99,7 +99,7 @@ class Assembly(ShortRepr, ABC):
 
     @property
     @abstractmethod
-    def stretched(self) -> float:
+    def stretched_motion(self) -> float:
         """The motion in the stretched position nearest to the unloaded one."""
 
     @property
@@ -213,7 +213,7 @@ class TurnedCrank(Assembly):
         return math.nan if self.anchor else self.unloaded
 
     @property
-    def stretched(self) -> float:
+    def stretched_motion(self) -> float:
         """The crank angle in the stretched position nearest to the unloaded one."""
         return self.unloaded - math.remainder(self.unloaded - self.linkage.stretched_angle, FULL_TURN)
 
@@ -239,7 +239,7 @@ class TurnedCrank(Assembly):
 
     def default_reference(self, low: float, high: float) -> float:
         """Return the stretched position, or the middle of a motion that it is not in."""
-        return self.stretched if low <= self.stretched <= high else 0.5 * (low + high)
+        return self.stretched_motion if low <= self.stretched_motion <= high else 0.5 * (low + high)
 
     def spread(self, share: FloatArray) -> FloatArray:
         """Return the shares as they are."""
@@ -285,7 +285,7 @@ class PushedSlider(Assembly):
         return self.side * self.knee < 0.0 and self.knee != math.pi
 
     @property
-    def stretched(self) -> float:
+    def stretched_motion(self) -> float:
         """The travel in the stretched position."""
         first, last = self.reach
         return first if self.linkage.find_path_ends(self.unloaded)[1] == self.linkage.stretched_position else last
